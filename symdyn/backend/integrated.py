@@ -16,6 +16,8 @@ OF_EVENTS = ("events", "event_resets", "reset_directions")
 OF_ADJOINT = ("rhs_weights", "corrected_weights")
 # Of sensitivities: their part of a projection, the derivatives of events.
 OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
+# With what resets made of the speeds in the place of ud, behind the bounds that there are.
+OF_CARRYING = ("carried_columns",)
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
 # Events that wait until they are taken are rows of which, time, state before, state after.
@@ -98,7 +100,7 @@ def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: C
                      n_in > 0 and (name == "rhs" or "inputs" in arguments_of[name]))
           for name in names if name in arguments_of]
     at += [Integrated(f"{name}_at", name, call(name, "out"), n_in > 0 and "inputs" in arguments_of[name], False, True)
-           for name in OF_ADJOINT if name in arguments_of]
+           for name in (*OF_ADJOINT, *OF_CARRYING) if name in arguments_of]
     return at + [Integrated(f"{name}_of", name, call(name, "out"), False, True) for name in OF_BOUNDS if name in arguments_of]
 
 
@@ -118,6 +120,8 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
         result.append(("SYMDYN_COLUMNS", shape.columns))
     if shape.carried is not None:
         result.append(("SYMDYN_CARRIED", shape.carried))
+    if shape.columns and shape.held:
+        result.append(("SYMDYN_BOUNDS", 6 * len(shape.leaves)))
     if shape.columns or method.template == "radau":
         result.append(("SYMDYN_STATE", shape.n_x // (1 + shape.columns)))
     if shape.n_rows:

@@ -6,7 +6,7 @@ leaves (see symdyn.functions.sensitivities) decides how many columns there are, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import given_by_time
 from symdyn.formulation.linearization import DIRECTION
-from symdyn.spatial.vectors import vector
+from symdyn.spatial.vectors import vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.node import is_zero
@@ -29,6 +29,22 @@ def direction_names(symbols: Symbols) -> list[str]:
     """Names of the leaves that stand for a direction of [q; u; z; inputs; parameters], in this order."""
     return [f"({DIRECTION} {s.name})" for s in (*symbols.coordinates, *symbols.speeds, *symbols.states, *symbols.inputs,
                                                 *symbols.parameters)]
+
+
+def places_of_resets(symbols: Symbols | Motion, events: Sequence[Any]) -> list[int]:
+    """Entries of [q; u] that events reset, in order."""
+    reset = {symbol for event in events for symbol, _ in event.reset}
+    return [k for k, symbol in enumerate((*symbols.coordinates, *symbols.speeds)) if symbol in reset]
+
+
+def carried_names(speeds: Sequence[Any], held: int) -> list[str]:
+    """Names of the leaves that stand for what resets make of speeds, see Sensitive.carried_variation: the jump of every speed,
+    the impulse along every entry of [q; u] that events reset, `held` of them."""
+    return [*[f"(jump of {u.name})" for u in speeds], *[f"(impulse {k + 1})" for k in range(held)]]
+
+
+# The leaf that stands for the direction of t.
+LATER = f"({DIRECTION} t)"
 
 
 class Sensitive:
@@ -94,6 +110,36 @@ class Sensitive:
             gaps = forward(self.recorder, [row.rate for row in motion.rows], seeds)
             changes = saddle.solve(none, -vector(*gaps))[0]
             return vector(*[seeds[leaf] for leaf in q], *[seeds[leaf] + change for leaf, change in zip(u, changes, strict=True)])
+
+    def carried_variation(self, held: Sequence[int]) -> np.ndarray:
+        """Derivative, (n_u,), of the speeds after a reset that the constraints carry on, along a direction of the coordinates
+        after it, of the speeds that are wanted, of inputs, parameters and t, at given impulses along the speeds that are held.
+
+        A reset wants u_w, and takes the nearest speeds in the metric of the mass matrix with those that are held as wanted:
+        M (u - u_w) + C_r^T lam = E^T nu, C_r u + C_t = 0, E u = E u_w. With the jump J = u - u_w this is differentiated at
+        constant nu; changes along `reset_directions` then take what is held to what is wanted. held: entries of [q; u] that
+        events reset; impulses along coordinates do not count.
+        """
+        motion, recorder, seeds = self.motion, self.recorder, self.direction()
+        names = carried_names(motion.speeds, len(held))
+        given = [recorder.leaf(name, kinds.ACCELERATION) for name in names]
+        jump, impulses = vector(*given[:len(motion.speeds)]), given[len(motion.speeds):]
+        later = recorder.leaf(LATER, kinds.ACCELERATION)
+        for leaf, rate in given_by_time(self.algebra.leaves).items():
+            seeds[leaf] = seeds.get(leaf, 0) + rate * later
+        saddle, M, C_r = motion.recall("corrector"), motion.recall("M_tilde"), motion.C_r()  # type: ignore[attr-defined]
+        with self.algebra.section("sensitivities across resets"):
+            along = zeros(len(jump))
+            for k, impulse in zip(held, impulses, strict=True):
+                if k >= len(motion.coordinates):
+                    along[k - len(motion.coordinates)] = impulse
+            lam = saddle.solve(along, C_r @ jump)[1]
+            fixed = vector(*[recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))])
+            change = substitute(tuple(forward(recorder, (M @ jump + C_r.T @ fixed).tolist(), seeds)),
+                                dict(zip(fixed, lam, strict=True)), recorder)
+            gaps = forward(recorder, [row.rate for row in motion.rows], seeds)
+            moved = saddle.solve(-vector(*change), -vector(*gaps))[0]
+            return vector(*[seeds[leaf] + e for leaf, e in zip(motion._leaves(motion.speeds), moved, strict=True)])
 
     def outputs_sensitivity(self) -> np.ndarray:
         """See above."""

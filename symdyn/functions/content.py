@@ -65,7 +65,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
-                    *column_names(symbols, right_side.sensitivities)], "ud": given_rates(equations, names),
+                    *column_names(symbols, right_side.sensitivities)],
+              "ud": given_rates(equations, names, right_side.sensitivities),
               "inputs": [*[s.name for s in symbols.inputs], *held_names(right_side.sensitivities, right_side.followed)],
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte,
                     *held_names(right_side.sensitivities, right_side.held)]}

@@ -14,7 +14,7 @@ import numpy as np
 from symdyn.backend.columns import Group, MotionColumns
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
-from symdyn.formulation.sensitivities import direction_names
+from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import reverse, seed_name
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, SEED, STATE
@@ -22,8 +22,9 @@ from symdyn.tape.passes import substitute
 from symdyn.tape.tape import Output, Tape
 
 # [q; u] of all columns after the projection of the state; of values at events, and of resets, their derivatives by the time and
-# along every column.
-CORRECTED, OF_EVENTS, OF_RESETS = COLUMNS = "corrected_columns", "event_columns", "event_reset_columns"
+# along every column; u of all columns after a reset that constraints carry on.
+CORRECTED, OF_EVENTS, OF_RESETS, CARRIED = COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns",
+                                                      "carried_columns")
 
 
 # From weights of x_dot, and of the state after its projection, to those of the state before and of what there is to change.
@@ -45,8 +46,19 @@ def held_names(sensitivities: Sequence[str], held: Sequence[str]) -> list[str]:
 def functions_of(equations: Equations) -> tuple[str, ...]:
     """The functions that a run with sensitivities needs besides those of any run."""
     names = [CORRECTED] if equations.constraints or equations.unit_groups else []
-    names += [OF_EVENTS] if "events" in equations.quantities else []
-    return (*names, *([OF_RESETS] if "event_resets" in equations.quantities else ()))
+    further = {OF_EVENTS: "events", OF_RESETS: "event_resets", CARRIED: "carried_variation"}
+    return (*names, *[name for name, quantity in further.items() if quantity in equations.quantities])
+
+
+def given_to_carry(equations: Equations, sensitivities: Sequence[str]) -> list[str]:
+    """Names of what CARRIED takes besides the state after a reset and the columns that are wanted: jumps of the speeds, impulses,
+    and by how much the event comes later along every column."""
+    held = places_of_resets(equations.symbols, equations.events)
+    return [*carried_names(equations.symbols.speeds, len(held)), *_later_names(sensitivities)]
+
+
+def _later_names(sensitivities: Sequence[str]) -> list[str]:
+    return [f"({k + 1} later)" for k in range(len(sensitivities))]
 
 
 def adjoints_of(equations: Equations) -> tuple[str, ...]:
@@ -67,6 +79,10 @@ def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held:
     if name == CORRECTED:
         return _tape(equations, name, np.concatenate([_with(equations, "corrected_variation", _normal(equations, column))
                                                       for column in columns]))
+    if name == CARRIED:
+        later = [equations.recorder.leaf(name, ACCELERATION) for name in _later_names(sensitivities)]
+        return _tape(equations, name, np.concatenate([_with(equations, "carried_variation", column, then)
+                                                      for column, then in zip(columns, later, strict=True)]))
     of = "events" if name == OF_EVENTS else "event_resets"
     parts = [equations.quantity(f"{of}_rate"), *[_with(equations, f"{of}_variation", column) for column in columns]]
     return _tape(equations, name, np.array(parts, dtype=object).T)
@@ -123,11 +139,11 @@ def _columns(equations: Equations, sensitivities: Sequence[str], held: Sequence[
             for k, by in enumerate(sensitivities)]
 
 
-def _with(equations: Equations, quantity: str, column: dict[str, Any]) -> np.ndarray:
-    """A derivative along a direction, along a column."""
+def _with(equations: Equations, quantity: str, column: dict[str, Any], later: Any = 0) -> np.ndarray:
+    """A derivative along a direction, along a column; later: the direction of t."""
     recorder = equations.recorder
     leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(equations.symbols)]
-    at = dict(zip(leaves, [*column["x"], *column["by"]], strict=True))
+    at = {recorder.leaf(LATER, ACCELERATION): later, **dict(zip(leaves, [*column["x"], *column["by"]], strict=True))}
     return vector(*substitute(tuple(equations.quantity(quantity)), at, recorder))
 
 

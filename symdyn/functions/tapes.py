@@ -28,7 +28,7 @@ from symdyn.formulation.derivatives import (
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
-from symdyn.formulation.sensitivities import direction_names
+from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
 from symdyn.functions import sensitivities as columns
 from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
 from symdyn.tape.balance import balance
@@ -177,18 +177,25 @@ def _only_output(tape: Tape) -> Output:
 _JACOBIANS = {f"jacobian_{by}": ("rhs", by) for by in ("x", "inputs", "params")}
 
 
-def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
+def given_rates(equations: Equations, names: Sequence[str], sensitivities: Sequence[str] = ()) -> list[str]:
     """What stands in the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
-    for the residual the rates of the coordinates, too, and multipliers."""
+    for the residual the rates of the coordinates, too, and multipliers; with sensitivities what carries them across resets,
+    behind bounds of events."""
     symbols, n_c = equations.symbols, len(equations.constraints)
-    if BOUNDS in names:
-        return bound_names(event_leaves(equations))
+    bounds = bound_names(event_leaves(equations)) if BOUNDS in names else []
+    if columns.CARRIED in names:
+        return [*bounds, *columns.given_to_carry(equations, sensitivities)]
+    if bounds:
+        return bounds
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
     if columns.ADJOINT in names:
         return weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
     if "outputs_sensitivity" in names:
         return direction_names(symbols)
+    if "carried_variation" in names:
+        held = places_of_resets(symbols, equations.events)
+        return [*carried_names(symbols.speeds, len(held)), LATER, *direction_names(symbols)]
     given = [f"{s.name}_dot" for s in symbols.speeds]
     if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
         given += multiplier_names(n_c)

@@ -31,7 +31,7 @@ DIRECTIONAL = ("unknowns", "adjoint")
 # Other quantities that take more arguments than a state, accelerations, inputs and parameters.
 OTHERS = ("variation", "second_variation", "outputs_variation", "residual", "rhs_baumgarte", "jacobian_x_baumgarte", "balance",
           "stiffness", "damping", "N_dot", "reactions_by_lam", "rhs_variation", "rhs_variation_by_matrix", "corrected_variation",
-          "outputs_sensitivity", "events_variation", "event_resets_variation")
+          "outputs_sensitivity", "events_variation", "event_resets_variation", "carried_variation")
 
 
 def named() -> sd.System:

@@ -12,7 +12,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.errors import SimulationWarning
 from symdyn.runtime.building.compiler import find_compiler
 from tests.derivatives.test_sensitivities import derivatives
 
@@ -102,19 +102,3 @@ def test_steps_go_on_as_without_sensitivities() -> None:
         np.testing.assert_allclose(run.events[name].t, rows.t, rtol=0, atol=1e-12)
         assert run.events[name].x.shape == rows.x.shape
     np.testing.assert_allclose(run.x, plain.x, rtol=0, atol=1e-11)
-
-
-def test_resets_on_constraints_are_refused() -> None:
-    x, y = sd.coordinates("x y")
-    m, length, g = sd.parameters("m l g", positive=True)
-    system = sd.System("bead", gravity=[0, -g])
-    rail, bead = system.add_body("rail", mass=m), system.add_body("bead", mass=m)
-    system.add_joint(sd.Prismatic("along", system.ground, rail, axis=[1, 0], coordinate=x))
-    system.add_joint(sd.Prismatic("up", rail, bead, axis=[0, 1], coordinate=y))
-    system.add_constraint(x**2 + y**2 - length**2, "circle")
-    system.add_event("hit", x, reset={x.dot: -x.dot})
-    system.defaults, system.initial = {m: 1, length: 1, g: 9.81}, {x: 0.6, y: 0.8}
-    module = system.augmented().compile()
-    with pytest.raises(ArgumentError, match="what the constraints make of the reset of hit is not differentiated; choose"):
-        module.simulate((0, 1), sensitivities=["l"])
-    assert module.simulate((0, 1), sensitivities=["l"], events=False).success

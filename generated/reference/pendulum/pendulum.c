@@ -509,7 +509,8 @@ enum {
     SYMDYN_EVENT_AT_ONCE = -8,      // events again and again with hardly any time between
     SYMDYN_NO_SERIES = -9,          // there is a right-hand side but no series of it
     SYMDYN_RESET_REJECTED = -10,    // the constraints do not let an entry be what a reset makes it
-    SYMDYN_NO_CONSTANTS = -11       // batches: the constants that follow from the parameters cannot be computed
+    SYMDYN_NO_CONSTANTS = -11,      // batches: the constants that follow from the parameters cannot be computed
+    SYMDYN_RESET_NOT_SMOOTH = -12   // what the constraints make of a reset has no derivative
 };
 
 typedef struct {

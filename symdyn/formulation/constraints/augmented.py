@@ -21,6 +21,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.contradictions import contradictions
 from symdyn.formulation.probes.dependent_rows import search
+from symdyn.formulation.sensitivities import Sensitive, places_of_resets
 from symdyn.formulation.trees.equations import tree_of, tree_result
 from symdyn.formulation.trees.quantities import TreeQuantities
 from symdyn.formulation.trees.reactions import reactions
@@ -87,13 +88,15 @@ class ConstrainedTree(Constrained, TreeQuantities):
         own = {"reactions_by_lam": self.reactions_by_lam}
         if self.rows and self._places_of_resets():
             own["reset_directions"] = self.reset_directions
+            own["carried_variation"] = self.carried_variation
         return {**super().quantities(), **own}
 
     def _places_of_resets(self) -> list[int]:
-        """Entries of [q; u] that events reset, in order."""
-        names = [*self.coordinates, *self.speeds]
-        reset = {symbol for event in self.model.events for symbol, _ in event.reset}
-        return [k for k, symbol in enumerate(names) if symbol in reset]
+        return places_of_resets(self, self.model.events)
+
+    def carried_variation(self) -> np.ndarray:
+        """See Sensitive."""
+        return Sensitive(self).carried_variation(self._places_of_resets())
 
     def reset_directions(self) -> np.ndarray:
         """Change of [q; u], as far as the constraints let it, by a force along each coordinate and an impulse along each speed

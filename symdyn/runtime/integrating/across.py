@@ -18,6 +18,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.carried_on import CarriedOn
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.way_back import Way
 from symdyn.runtime.losses import Cost
@@ -185,6 +186,7 @@ class Jump:
     first: int
     after: np.ndarray | None = None
     slope_after: np.ndarray | None = None
+    reset: CarriedOn | None = None
 
     def back(self, integral: Cost | None, weights: np.ndarray, end: float = 0.0) -> float:
         """Carry weights of the state after it to that before, in place; end: what the loss gains by time, where the motion ends
@@ -200,14 +202,10 @@ class Jump:
             assert self.slope_after is not None
             moved = weights[:n_x].copy()
             later -= float(moved @ self.slope_after)
-            places, rows = self._resets()
-            weights[places] = 0.0
-            if places:
-                by_x, by_t, by_others = (d[rows] for d in self._derivatives("event_resets"))
-                weights[:n_x] += moved[places] @ by_x
-                weights[n_x:] += moved[places] @ by_others
-                later += float(moved[places] @ by_t)
-            later += float(weights[:n_x] @ self.slope)
+            by_x, by_t, by_others = self._through_resets()
+            weights[:n_x] = moved @ by_x
+            weights[n_x:] += moved @ by_others
+            later += float(moved @ by_t) + float(weights[:n_x] @ self.slope)
         weights[:n_x] -= later / rate * g_x[self.first]
         weights[n_x:] -= later / rate * g_others[self.first]
         return 0.0
@@ -217,7 +215,31 @@ class Jump:
         g_x, g_t, _ = self._derivatives("events")
         return float(g_t[self.first] + g_x[self.first] @ self.slope)
 
-    def _resets(self) -> tuple[list[int], list[int]]:
+    def _through_resets(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives of the state after resets by that before, by the time, and by what is carried."""
+        n_x = len(self.x)
+        by_x, by_t, by_others = np.eye(n_x), np.zeros(n_x), np.zeros((n_x, len(self.way.carried)))
+        places, rows = self.resets()
+        if places:
+            by_x[places], by_t[places], by_others[places] = (d[rows] for d in self._derivatives("event_resets"))
+        if self.reset is None or self.slope_after is None:
+            return by_x, by_t, by_others
+        whole = self.reset.carried(self.way, np.column_stack([by_x, by_t, by_others]), self.slope_after)
+        return whole[:, :n_x], whole[:, n_x], whole[:, n_x + 1:]
+
+    def go_on(self, after: np.ndarray) -> np.ndarray:
+        """The state after the resets; after: that before them, which is changed."""
+        module, p, places = self.way.module, self.way.request.p, self.resets()[0]
+        if not places:
+            return after
+        values = module.evaluate("event_resets", self.t, self.x, p, _Field(module, self.way.request).inputs(self.t, self.x))
+        after[places] = values[self.resets()[1]]
+        if module.metadata.constraints and any(place < module.metadata.sizes.q + module.metadata.sizes.u for place in places):
+            self.reset = CarriedOn.of(module, self.t, after, p, places)
+            return self.reset.after
+        return after
+
+    def resets(self) -> tuple[list[int], list[int]]:
         """Entries of the state that are reset, and their rows in the function of all resets; the last reset of one counts."""
         found, row = {}, 0
         for k, record in enumerate(self.way.module.metadata.events):
@@ -364,10 +386,7 @@ class Chain:
         if any(records[k].stop for k in cut.events):
             return t, x, True
         later = self.cuts[number + 1].t if number + 1 < len(self.cuts) else self.request.span[1]
-        after = x.copy()
-        places, rows = jump._resets()
-        if places:
-            after[places] = self.module.evaluate("event_resets", t, x, self.request.p, field.inputs(t, x))[rows]
+        after = jump.go_on(x.copy())
         length = min(bridge.length, MOST * (later - t), key=abs)
         jump.after, jump.slope_after = after, field.one_sided(t, after, BESIDE * length)
         if not length:

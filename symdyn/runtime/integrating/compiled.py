@@ -22,7 +22,7 @@ from symdyn.runtime.integrating.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.run_record import STATUS, Report, RunReport
 from symdyn.runtime.integrating.short_steps import ShortSteps
-from symdyn.runtime.integrating.stabilization import Corrections, not_converged, reset_rejected
+from symdyn.runtime.integrating.stabilization import Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
 
@@ -290,7 +290,8 @@ def stopped_because(module: Module, run: Run, status: int, report: Report) -> st
 
 def _message(module: Module, run: Run, status: int, report: Report, interrupted: bool, stopped: bool,
              chatters: str) -> str:
-    metadata, of, x, x_fail = run.unit.metadata, report.of, report.x, report.x_fail
+    metadata, of = run.unit.metadata, report.of
+    x, x_fail = (state[:run.request.n_state] for state in (report.x, report.x_fail))
     t, t_fail = of.t, of.t_fail
     if interrupted:
         return describe_stop(metadata, t, x, "interrupted")
@@ -309,6 +310,8 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
     if status == STATUS.RESET_REJECTED:
         why = reset_rejected(metadata.x[of.bad_index], of.reset_gap)
         return describe_stop(metadata, t_fail, x_fail, why)
+    if status == STATUS.RESET_NOT_SMOOTH:
+        return describe_stop(metadata, t_fail, x_fail, not_smooth(metadata.x[of.bad_index] if of.bad_index >= 0 else ""))
     if status == STATUS.FIELD_FAILED:
         why = _dependent(module, run, t_fail, x_fail) + _inputs(module, run, t_fail, x_fail)
         return describe_stop(metadata, t_fail, x_fail, run.unit.reason(of.reason) + why)

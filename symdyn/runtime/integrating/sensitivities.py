@@ -94,20 +94,12 @@ class Asked:
                                 "the projected motion: leave stabilization out")
         if work:
             raise ArgumentError(f"{module.name}: sensitivities were asked for together with work=True; make two runs")
-        metadata, looked = module.metadata, request.look
-        moved = metadata.sizes.q + metadata.sizes.u
-        kept = [e.name for e, look in zip(metadata.events, () if looked is None else looked, strict=False)
-                if look and any(place < moved for place in e.reset)]
-        if metadata.constraints and kept:
-            raise ArgumentError(f"{module.name}: sensitivities were asked for, but what the constraints make of the reset of "
-                                f"{', '.join(kept)} is not differentiated; choose coordinates without constraints, or leave the "
-                                "event out: events=[...]")
         if any(one.sampled.gradient is None for one in request.inputs.samplers):
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but the derivatives of a sampled controller by "
                                 "the state are not known; pass sd.Sampled(function, period, gradient=...), a function of (t, x)")
         unknown = _depend_on_state(request) - {place for places, *_ in request.inputs.gradients for place in places}
         if unknown:
-            names = ", ".join(metadata.inputs[k] for k in sorted(unknown))
+            names = ", ".join(module.metadata.inputs[k] for k in sorted(unknown))
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "
                                 f"the user, whose derivatives are not known: {names}; pass sd.Smooth(function, gradient=...), a "
                                 "function of (t, x), write the law into the system's loads as expressions of coordinates and "

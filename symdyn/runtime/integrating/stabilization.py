@@ -155,18 +155,28 @@ class Projector:
             if worst <= 1e-15 or worst > 0.7 * before:
                 break
             try:
-                directions = self._evaluate("reset_directions", t, x).reshape(-1, len(factors))[rows]
-                own = np.diag(directions[:, places]) * factors[places]
-                # What would take the others a million times as far is held by the constraints.
-                free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
-                G = directions[free][:, np.array(places)[free]].T
-                x[:len(factors)] += _multipliers(G, gaps[free]) @ directions[free]
+                directions = self.directions(t, x)[rows]
+                x[:len(factors)] += self.impulses(directions, places, gaps) @ directions
                 x[:] = self(t, x)
             except ProjectionFailed:
                 worst = np.inf
                 break
         if worst > allowed:
             raise ProjectionFailed(reset_rejected(self.module.metadata.x[entry], left))
+
+    def directions(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The function reset_directions, (n, n_q + n_u)."""
+        return self._evaluate("reset_directions", t, x).reshape(-1, self.n_q + self.n_u)
+
+    def impulses(self, directions: np.ndarray, places: Sequence[int], gaps: np.ndarray) -> np.ndarray:
+        """What closes gaps (n, ...) of entries `places` along their directions (n, n_q + n_u), likewise."""
+        factors, n = np.concatenate([self.lengths, self.velocities]), len(places)
+        own = np.diag(directions[:, places]) * factors[places]
+        # What would take the others a million times as far is held by the constraints.
+        free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
+        found = np.zeros((n, *gaps.shape[1:]))
+        found[free] = _multipliers(directions[free][:, np.array(places)[free]].T, gaps[free])
+        return found
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
         """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
@@ -257,12 +267,22 @@ def reset_rejected(entry: str, gap: float) -> str:
             "fewer coordinates and speeds, from which the others follow, or to values that the constraints allow")
 
 
+def not_smooth(entry: str) -> str:
+    """What to say where sensitivities do not go across a reset that the constraints carry on; entry: what they do not let change
+    as its reset does, "" where coordinates are off them."""
+    if entry:
+        return (f"the constraints allow what the reset of an event makes of {entry} at these numbers alone: it has no "
+                "derivative; reset fewer coordinates and speeds, from which the others follow, or leave sensitivities out")
+    return ("the reset of an event takes coordinates off the constraints and leaves some of them free, so that where they end "
+            "has no derivative; reset as many as determine all others, or all of them to a position on the constraints")
+
+
 def _multipliers(G: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """mu with G mu = gaps, as well as it can be, for a positive semidefinite G: scaled to a diagonal of ones."""
+    """mu (n, ...) with G mu = gaps, as well as it can be, for a positive semidefinite G: scaled to a diagonal of ones."""
     if not len(gaps):
         return gaps
     factors = 1 / np.sqrt(np.diag(G))
-    found: np.ndarray = factors * np.linalg.lstsq(G * np.outer(factors, factors), factors * gaps, rcond=1e-10)[0]
+    found: np.ndarray = (factors * np.linalg.lstsq(G * np.outer(factors, factors), (factors * gaps.T).T, rcond=1e-10)[0].T).T
     return found
 
 

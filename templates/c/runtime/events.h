@@ -322,6 +322,10 @@ static int symdyn_event_columns(symdyn_run *run, double t, const double *x, doub
                 columns[N * (j + 1) + symdyn_reset_index[r]] = becomes[r * WIDTH + 1 + j] + becomes[r * WIDTH] * later[j];
     for (int i = N; i < SYMDYN_NX; i++) y[i] = columns[i];
 #endif
+#if SYMDYN_KEEPS_RESETS
+    for (int i = 0; i < N; i++) y[i] = after[i];
+    if ((failure = symdyn_keep_columns(run, t, x, y, run->events.asked, then, later))) return failure;
+#endif
     for (int j = 0; j < SYMDYN_COLUMNS; j++)
         for (int i = 0; i < N; i++) after[N * (j + 1) + i] = y[N * (j + 1) + i] - then[i] * later[j];
     *changed = 1;
@@ -355,6 +359,9 @@ static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double
             }
 #endif
 #if SYMDYN_KEEPS_RESETS
+#if SYMDYN_SENSITIVE
+    for (int i = 0; i < SYMDYN_HELD; i++) run->events.asked[i] = asked[i];
+#endif
     return symdyn_keep_resets(run, t, x, after, asked);
 #endif
 #if SYMDYN_PROJECTS && !SYMDYN_KEEPS_RESETS

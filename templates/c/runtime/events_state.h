@@ -19,6 +19,12 @@ typedef struct {
     double spacing;              // of samples at the most, s; 0: any
     double t, after[SYMDYN_NX];  // of the latest reset; the state after it
     double reset_gap;            // by how much a reset that was rejected is off
+#if SYMDYN_SENSITIVE && SYMDYN_KEEPS_RESETS
+    // What the constraints made of the latest reset: jumps of the speeds, impulses along entries that are held; whether the
+    // coordinates that were wanted were off the constraints; which entries were asked for.
+    double made[SYMDYN_NU + SYMDYN_HELD];
+    int off_constraints, asked[SYMDYN_HELD];
+#endif
     int n_noted;
     double noted[SYMDYN_NOTES * SYMDYN_NOTE];  // events, times, states before and after them, until they are taken
 } symdyn_events;
