@@ -7,8 +7,13 @@
 Of x_dot, multipliers and inverse dynamics, the derivatives by x, inputs, parameters, time and accelerations are taken along a
 random direction in each group, by module.jacobian, and compared with the central difference of the function's own tape.
 Along Euler parameters a direction keeps their norm; where constraints are redundant it stays on them. An error is that of J v
-relative to |J| |v| (Frobenius), or to the function where its derivative vanishes, by the condition number of the equations that
-accelerations and multipliers are solved from; it must be at most BOUND. Multipliers of redundant constraints, which the
+relative to |J| |v| (Frobenius), or to the size of the function where its derivative vanishes, by the condition number of the
+equations that accelerations and multipliers are solved from; it must be at most BOUND. The size of a function is that of the
+terms that it adds, not of their sum: at rest forces cancel to a rounding error, 1e-14 of what each of them makes, and nothing
+computed from them can be known better than to the rounding of these terms. The sizes of the terms are what the numbers that the
+function takes contribute by their own size, sum |df/dd_k d_k| over its arguments d_k: the function's norm times its componentwise
+condition number (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., section 1.6; Gohberg and Koltracht, Mixed,
+componentwise, and structured condition numbers, 1993). Multipliers of redundant constraints, which the
 motion does not determine, have no derivatives and are left out. Derivatives of rows of states must have the bits of those of
 each state.
 """
@@ -107,8 +112,9 @@ def measure(name: str, equations: Equations, modules: Sequence[Any], point: Poin
     for of in (f for f in FUNCTIONS if has_function(equations, f) and f not in left_out):
         tape = function_tape(equations, of)
         value = _exact(equations, tape, values).astype(float)
-        level = float(np.linalg.norm(value))
-        for by in _groups(of, point):
+        by_group = {by: _derivative(modules[0], of, by, point, 1)[0] for by in _groups(of, point)}
+        level = size_of_terms(value, [(matrix, point.group(by)) for by, matrix in by_group.items()])
+        for by in by_group:
             direction = _direction(equations, modules[0], by, point, rng)
             exact = _difference(equations, tape, values, by, point, direction)
             for module in modules if (of, by) == OF_C else modules[:1]:
@@ -119,6 +125,13 @@ def measure(name: str, equations: Equations, modules: Sequence[Any], point: Poin
                 rows = _derivative(module, of, by, point, 3)
                 same &= all(np.array_equal(row, found) for row in rows)
     return Result(name, errors, condition, same, clock.perf_counter() - begun)
+
+
+def size_of_terms(value: np.ndarray, derivatives: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """The norm of a function times its componentwise condition number: of its value (n,), or of what each number contributes by
+    its own size if that is more; derivatives: by groups of numbers, (n, k), with these numbers, (k,)."""
+    parts = sum((np.abs(matrix) @ np.abs(numbers) for matrix, numbers in derivatives), np.zeros(len(value)))
+    return max(float(np.linalg.norm(parts)), float(np.linalg.norm(value)))
 
 
 def _groups(of: str, point: Point) -> list[str]:

@@ -43,6 +43,16 @@ def test_wrong_derivatives_fail(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     assert "FAILED" in printed and "1 mechanisms, 1 fail" in printed
 
 
+def test_errors_at_rest_count_by_the_terms_that_cancel() -> None:
+    """Forces that hold each other: x_dot is a rounding error of theirs, and so is its derivative by the time."""
+    assert random_result(861, 0).passed
+    # f = a - b at a = b: its value vanishes, what it adds does not.
+    size = derivatives.size_of_terms(np.zeros(1), [(np.array([[1.0, -1.0]]), np.array([3.0, 3.0]))])
+    assert size == 6.0
+    # A function that no number contributes to counts by its value.
+    assert derivatives.size_of_terms(np.array([3.0, 4.0]), [(np.zeros((2, 1)), np.ones(1))]) == 5.0
+
+
 def test_verdicts() -> None:
     one = Result("one", {"rhs by x": 1e-15, "lam by x": 9e-14}, 10.0, True, 0.1)
     assert one.passed and one.worst == ("lam by x", 9e-14)
