@@ -160,6 +160,9 @@ class _Search:
     def __init__(self, state: State) -> None:
         self.state, self.equations = state, state.equations
         m = state.m
+        if state.drifting and self.equations.constraints:
+            raise SymdynError(f"{self.equations.name}: steady motions in closed form were requested, but its constraints take "
+                              "part in them; use module.equilibria()")
         if self.equations.unit_groups:
             raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested of Euler parameters; describe "
                               "the orientation by Euler angles, or use module.equilibria()")

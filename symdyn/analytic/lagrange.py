@@ -80,6 +80,12 @@ class Mechanics:
         balance, n_u, n_c = self.equations.quantity("balance"), len(self.u), len(self.equations.constraints)
         return balance[:n_u], balance[n_u:n_u + n_c], balance[n_u + n_c:n_u + n_c + len(self.z)]
 
+    def constraint_rates(self) -> tuple[np.ndarray, np.ndarray]:
+        """C_dot, which of velocity constraints is A u + b itself, and C_ddot."""
+        balance, n_c = self.equations.quantity("balance"), len(self.equations.constraints)
+        begin = len(self.u) + n_c + len(self.z)
+        return balance[begin:begin + n_c], balance[begin + n_c:begin + 2 * n_c]
+
     def state_rates(self) -> list[Any]:
         """z_dot of extra states."""
         return list(self.statics()[2])

@@ -2,9 +2,11 @@
 
 M eta_ddot + C eta_dot + K eta = F_in in', with eta the changes of independent coordinates from the state: derivatives of what the
 equations make zero, r = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, on the tape, by exact rules. The state is an equilibrium
-where the conditions hold; M, C, K are those of a linearization where they do. Constraints C(q) = 0 are reduced at states of rest:
-eta' = Z eta with C_r Z = 0, multipliers from the rows of dependent speeds, and K holds the change of C_r^T lam.
-Source: Meirovitch, Methods of Analytical Dynamics, chapters 6 and 7; for the reduction Bauchau, Flexible Multibody Dynamics, 11.
+or steady motion where the conditions hold; M, C, K are those of a linearization where they do. Constraints are reduced:
+multipliers come from the rows of dependent speeds, and K holds the change of C_r^T lam. Constraints of velocities leave fewer
+speeds zeta than displacements eta: M zeta_dot + C zeta + K eta = F_in in', eta_dot = E zeta + W eta; see
+symdyn.analytic.reduced.
+Source: Meirovitch, Methods of Analytical Dynamics, chapters 6 and 7.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import sympy as sp
 
 from symdyn.analytic.lagrange import Mechanics
 from symdyn.analytic.minors import solve
+from symdyn.analytic.reduced import DIGITS, Reduced, reduced, unconstrained
 from symdyn.errors import ArgumentError, EvaluationError, SymdynError
 from symdyn.exact.prove import decide, drawn_state
 from symdyn.exact.ring import TooLarge
@@ -42,9 +45,8 @@ if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
     from symdyn.given import Named, Scalar
 
-# Terms that a product may have in an entry, seconds in which a matrix is written; digits of the numbers by which dependent speeds
-# are chosen.
-BOUND, SECONDS, DIGITS = 200_000, 10.0, 30
+# Terms that a product may have in an entry, seconds in which a matrix is written.
+BOUND, SECONDS = 200_000, 10.0
 # Operations with kinks or jumps; slopes on both sides that differ by more than this, of their size, make one.
 _ROUGH = {"abs", "sign", "min", "max", "select", "floor", "ceil"}
 KINK = 1e-6
@@ -54,9 +56,12 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Linearized:
-    """M eta_ddot + C eta_dot + K eta = F_in in', explicit; x'_dot = A x' + B in' of x' = [eta; eta_dot; z'].
+    """M eta_ddot + C eta_dot + K eta = F_in in', explicit; x'_dot = A x' + B in' of x' = [eta; zeta; z'], zeta = eta_dot.
 
-    coordinates   what eta is the change of, (n,): coordinates, quasi-velocities for turning about their axes
+    With constraints of velocities: M zeta_dot + C zeta + K eta = F_in in', eta_dot = E zeta + W eta
+
+    coordinates   what eta is the change of, (n_d,): coordinates, quasi-velocities for turning about their axes
+    speeds        what zeta is the change of, (n_s,); rated: which of the coordinates each of them is the rate of
     inputs        of the columns of F_in and B; states: extra ones, z
     about         what was inserted: symbol -> value; what is not in it is zero, or drifts in a steady motion
     conditions    equations in the parameters that make the state an equilibrium or steady motion; () where it always is one
@@ -65,6 +70,8 @@ class Linearized:
 
     name: str
     coordinates: tuple[sp.Symbol, ...]
+    speeds: tuple[sp.Symbol, ...]
+    rated: tuple[int, ...]
     inputs: tuple[sp.Symbol, ...]
     states: tuple[sp.Symbol, ...]
     about: Mapping[sp.Symbol, sp.Expr]
@@ -74,23 +81,38 @@ class Linearized:
 
     @property
     def M(self) -> sp.Matrix:
-        """(n, n) mass matrix."""
+        """(n_s, n_s) mass matrix."""
         return self._matrix("M")
 
     @property
     def C(self) -> sp.Matrix:
-        """(n, n) damping and gyroscopic terms."""
+        """(n_s, n_s) damping and gyroscopic terms."""
         return self._matrix("C")
 
     @property
     def K(self) -> sp.Matrix:
-        """(n, n) stiffness."""
+        """(n_s, n_d) stiffness."""
         return self._matrix("K")
 
     @property
     def F_in(self) -> sp.Matrix:
-        """(n, n_in) forces by the inputs."""
+        """(n_s, n_in) forces by the inputs."""
         return self._matrix("F_in")
+
+    @property
+    def E(self) -> sp.Matrix:
+        """(n_d, n_s) of eta_dot = E zeta + W eta; one without constraints of velocities."""
+        return self._matrix("E")
+
+    @property
+    def W(self) -> sp.Matrix:
+        """(n_d, n_d) of eta_dot = E zeta + W eta; zero at rest, and without constraints of velocities."""
+        return self._matrix("W")
+
+    @property
+    def holonomic(self) -> bool:
+        """Whether zeta is eta_dot: no constraints of velocities."""
+        return len(self.speeds) == len(self.coordinates)
 
     def _matrix(self, name: str) -> sp.Matrix:
         """Each entry in its shortest form. Raises SymdynError for what is too large."""
@@ -133,20 +155,20 @@ class Linearized:
         n, n_z, get = len(self.coordinates), len(self.states), self.nodes
         forces = np.hstack([-get["K"], -get["C"], -get["R_z"], get["F_in"]])
         by_mass = solve(get["M"], forces)
-        m = 2 * n + n_z
-        top = np.hstack([zeros(n, n), np.eye(n, dtype=int).astype(object), zeros(n, n_z + forces.shape[1] - m)])
+        m = n + len(self.speeds) + n_z
+        top = np.hstack([get["W"], get["E"], zeros(n, n_z + forces.shape[1] - m)])
         bottom = np.hstack([get["Z_q"], get["Z_u"], get["Z_z"], get["Z_in"]])
         whole = np.vstack([top, by_mass, bottom])
         return whole[:, :m], whole[:, m:]
 
     @property
     def A(self) -> sp.Matrix:
-        """(2 n + n_z, 2 n + n_z), with the inverse of M by Cramer's rule. Raises SymdynError for what is too large."""
+        """(m, m), m = n_d + n_s + n_z, with the inverse of M by Cramer's rule. Raises SymdynError for what is too large."""
         return self._of_space("A", 0)
 
     @property
     def B(self) -> sp.Matrix:
-        """(2 n + n_z, n_in). Raises SymdynError for what is too large."""
+        """(m, n_in). Raises SymdynError for what is too large."""
         return self._of_space("B", 1)
 
     def _of_space(self, name: str, k: int) -> sp.Matrix:
@@ -156,7 +178,7 @@ class Linearized:
         return self._written[name]
 
     def characteristic(self) -> Characteristic:
-        """det(M s^2 + C s + K) with its coefficients, and the conditions of Routh and Hurwitz; see symdyn.analytic.stability."""
+        """det(M s^2 + C s + K), with its coefficients, and the conditions of Routh and Hurwitz; see symdyn.analytic.stability."""
         from symdyn.analytic.stability import characteristic
 
         return characteristic(self)
@@ -185,10 +207,15 @@ class Linearized:
 
     def __str__(self) -> str:
         lines = [f"{self.name}: linear equations in {', '.join(map(str, self.coordinates))}"]
+        changes = "" if self.holonomic else f", with changes zeta of {', '.join(map(str, self.speeds))}"
         if self.states:  # coupled with the coordinates: the matrices of second order are not all
             names = ["A", *["B"] * bool(self.inputs)]
-            lines.append(f"  x'_dot = A x'{' + B in' if self.inputs else ''} of x' = [eta; eta_dot; "
-                         f"{'; '.join(map(str, self.states))}]")
+            lines.append(f"  x'_dot = A x'{' + B in' if self.inputs else ''} of x' = "
+                         f"[eta; {'eta_dot' if self.holonomic else 'zeta'}; {'; '.join(map(str, self.states))}]{changes}")
+        elif not self.holonomic:
+            names = ["M", "C", "K", "E", "W", *["F_in"] * bool(self.inputs)]
+            lines.append(f"  M zeta_dot + C zeta + K eta = {'F_in in' if self.inputs else '0'}, "
+                         f"eta_dot = E zeta + W eta{changes}")
         else:
             names = ["M", "C", "K", *["F_in"] * bool(self.inputs)]
         lines += [f"  {name} = {self._shown(name).tolist()}" for name in names]
@@ -203,14 +230,22 @@ class Linearized:
 
     def _repr_latex_(self) -> str:
         inputs = sp.latex(sp.Matrix(self.inputs)) if self.inputs else ""
+        speeds = r"\dot{\eta}" if self.holonomic else r"\zeta"
+        rows = []
         if self.states:
-            state = r"\begin{bmatrix} \eta \\ \dot{\eta} \\ " + r" \\ ".join(map(sp.latex, self.states)) + r" \end{bmatrix}"
+            state = rf"\begin{{bmatrix}} \eta \\ {speeds} \\ " + r" \\ ".join(map(sp.latex, self.states)) + r" \end{bmatrix}"
             right = f"{sp.latex(self.A)} {state}" + (f" + {sp.latex(self.B)} {inputs}'" if inputs else "")
             rows = [rf"\frac{{d}}{{dt}} {state} &= {right}"]
         else:
-            accents = (("M", r"\ddot{\eta}"), ("C", r"\dot{\eta}"), ("K", r"\eta"))
+            rates = r"\ddot{\eta}" if self.holonomic else r"\dot{\zeta}"
+            accents = (("M", rates), ("C", speeds), ("K", r"\eta"))
             left = " + ".join(f"{sp.latex(self._matrix(name))} {eta}" for name, eta in accents)
             rows = [f"{left} &= " + (f"{sp.latex(self.F_in)} {inputs}'" if inputs else "0")]
+            if not self.holonomic:
+                moved = "" if self.W.is_zero_matrix else rf" + {sp.latex(self.W)} \eta"
+                rows.append(rf"\dot{{\eta}} &= {sp.latex(self.E)} \zeta{moved}")
+        if not self.holonomic:
+            rows.append(rf"\zeta &= {sp.latex(sp.Matrix(self.speeds))}'")
         rows += [rf"{sp.latex(e.lhs)} &= 0 && \text{{condition}}" for e in self.conditions]
         return "$\\displaystyle \\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}$"
 
@@ -245,17 +280,20 @@ def _is_rounding(e: sp.Expr) -> bool:
     return bool(e.is_number) and bool(e.has(sp.Float)) and abs(complex(e)) < ROUNDING
 
 
-def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hold: Any = ()) -> Linearized:
+def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hold: Any = (), coordinates: Any = (),
+               ) -> Linearized:
     """The linear equations about a state.
 
     about   symbol or name of coordinates, speeds, extra states, inputs -> number or expression in parameters, which may be new
             symbols; what is left out is zero. Speeds make it a steady motion: their coordinates must not stand in the result
     hold    coordinates or speeds that are held, by symbol or name: their rows and columns are left out
-    Raises ArgumentError for unknown names and values that move, SymdynError for what has no constant linear equations: where
-    time appears, where what drifts appears, velocity constraints, steady motion under constraints or in quasi-velocities.
+    coordinates   those that are to be independent under constraints, by symbol or name; default: the first ones that are
+    Raises ArgumentError for unknown names, values that move and coordinates that depend on others, SymdynError for what has no
+    constant linear equations: where time appears, where what drifts appears, steady motion in quasi-velocities.
     """
     try:
-        return _Linearization(State(equations, about, hold)).result()
+        state = State(equations, about, hold)
+        return _Linearization(state, state.indices(coordinates, "coordinates")).result()
     except EvaluationError as error:
         raise SymdynError(f"{equations.name}: linear equations were requested at a state where an expression divides by zero "
                           f"({error}); what about leaves out is zero: give another state") from None
@@ -271,7 +309,7 @@ class State:
     def __init__(self, equations: Equations, about: Any, hold: Any, parameters: Mapping[Any, Any] | None = None,
                  what: str = "about") -> None:
         """parameters: values for them, by symbol or name; what: the name of `about` in errors. Raises ArgumentError, and
-        SymdynError for a steady motion under constraints or in quasi-velocities, and for loads that depend on multipliers."""
+        SymdynError for a steady motion in quasi-velocities, and for loads that depend on multipliers."""
         self.equations, self.m = equations, Mechanics(equations)
         if equations.constraints and equations.implicit_loads:
             raise SymdynError(f"{equations.name}: its state was requested in symbols, but {', '.join(equations.implicit_loads)} "
@@ -279,7 +317,7 @@ class State:
                               "or module.equilibrium()")
         self.symbols: dict[Node, Any] = {leaf: s for leaf, s in equations.printed_leaves().items() if leaf.mask == PARAMETER}
         self.about = self._taken(about, what)
-        self.held = self._held(hold)
+        self.held = self.indices(hold, "hold")
         m, s = self.m, equations.symbols
         taken = _Values(equations.name, m.recorder, self.symbols)
         self.values = {equations.leaves[key]: taken.node(f"{what}: {key}", value) for key, value in self.about.items()}
@@ -290,10 +328,9 @@ class State:
         self.parameters = {known[name_of(key)]: taken.node(name_of(key), value) for key, value in (parameters or {}).items()}
         self.multipliers = [m.recorder.leaf(name, ACCELERATION) for name in multiplier_names(len(equations.constraints))]
         moving = [k for k, u in enumerate(m.u) if not is_zero(self.values.get(u, 0))]
-        if moving and (equations.constraints or not m.plain):
-            why = "its constraints" if equations.constraints else "its quasi-velocities"
-            raise SymdynError(f"{equations.name}: a steady motion was requested in symbols, but {why} take part in it; use "
-                              "module.linearize(at), or coordinates that need none")
+        if moving and not m.plain:
+            raise SymdynError(f"{equations.name}: a steady motion was requested in symbols, but its quasi-velocities take part "
+                              "in it; use module.linearize(at), or coordinates that need none")
         self.drifting = [s.coordinates[k] for k in moving]
 
     def put(self) -> dict[Node, Any]:
@@ -312,23 +349,22 @@ class State:
             raise ArgumentError(f"{self.equations.name}: {what} has {', '.join(wrong)}; it takes {', '.join(known)}")
         return {known[name_of(key)]: value for key, value in (about or {}).items()}
 
-    def _held(self, hold: Any) -> list[int]:
-        """Indices of speeds that are held."""
+    def indices(self, names: Any, what: str) -> list[int]:
+        """Indices of speeds, by symbol or name of these or of coordinates; what: the argument's name in errors."""
         s = self.equations.symbols
-        names = [name_of(h) for h in (hold if isinstance(hold, (list, tuple, set, sp.MatrixBase)) else [hold])]
+        found = [name_of(h) for h in (names if isinstance(names, (list, tuple, set, sp.MatrixBase)) else [names])]
         known = {u.name: k for k, u in enumerate(s.speeds)}
         if self.m.plain:
             known |= {q.name: k for k, q in enumerate(s.coordinates)}
-        wrong = [n for n in names if n not in known]
+        wrong = [n for n in found if n not in known]
         if wrong:
-            raise ArgumentError(f"{self.equations.name}: hold is {', '.join(wrong)}; it takes {', '.join(known)}")
-        return sorted({known[n] for n in names})
+            raise ArgumentError(f"{self.equations.name}: {what} is {', '.join(wrong)}; it takes {', '.join(known)}")
+        return sorted({known[n] for n in found})
 
 
 class _Linearization:
-    dependent: Sequence[int] = ()
-
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, wanted: Sequence[int]) -> None:
+        self.wanted = wanted
         self.state, self.equations, self.m = state, state.equations, state.m
         self.symbols, self.about, self.held, self.drifting = state.symbols, state.about, state.held, state.drifting
         s, leaves = self.equations.symbols, self.equations.leaves
@@ -343,79 +379,52 @@ class _Linearization:
         m, equations = self.m, self.equations
         r, C, z_dot = m.statics()
         self._demand_smooth([*r, *C, *z_dot])
-        lam = self.state.multipliers
         free = [k for k in range(len(m.u)) if k not in self.held]
-        Z, conditions = self._unconstrained(free) if not lam else self._constrained(r, C, lam, free)
-        conditions = [*conditions, *z_dot]
-        N = equations.quantity("N")
+        N = m.at(equations.quantity("N"), self.values)
         if not m.plain:
             self._demand_rest()
-        moved = N @ Z
-        n, n_z = Z.shape[1], len(m.z)
-        nodes = {"M": Z.T @ self._by(r, m.ud) @ Z, "C": Z.T @ self._by(r, m.u) @ Z, "K": Z.T @ self._by(r, m.q) @ moved,
-                 "R_z": Z.T @ self._by(r, m.z), "F_in": -(Z.T @ self._by(r, m.inputs)),
-                 "Z_q": self._by(z_dot, m.q) @ moved, "Z_u": self._by(z_dot, m.u) @ Z, "Z_z": self._by(z_dot, m.z),
+        by, found = self._constrained(r, N, free) if self.state.multipliers else (unconstrained(len(m.u), free), [])
+        # C stays where C_dot is zero, which is a condition, too: what drifts counts with its first value.
+        first = {leaf: self.values.get(leaf, 0) for leaf in m.q}
+        conditions = [*found, *m.at(C, {**self.values, **first}), *z_dot]
+        Z, Z_w, moved = by.Z_u, by.Z_w, N @ by.Z_v
+        damping, drag = self._by(z_dot, m.u), self._by(r, m.u)
+        M = Z.T @ m.at(self._by(r, m.ud), self.values)
+        n, n_s, n_z = len(by.displacements), len(by.speeds), len(m.z)
+        nodes = {"M": M @ Z, "C": Z.T @ drag @ Z + M @ Z_w @ by.E,
+                 "K": Z.T @ (self._by(r, m.q) @ moved + drag @ Z_w) + M @ Z_w @ by.W,
+                 "E": by.E, "W": by.W, "R_z": Z.T @ self._by(r, m.z), "F_in": -(Z.T @ self._by(r, m.inputs)),
+                 "Z_q": self._by(z_dot, m.q) @ moved + damping @ Z_w, "Z_u": damping @ Z, "Z_z": self._by(z_dot, m.z),
                  "Z_in": self._by(z_dot, m.inputs), "conditions": vector(*(Z.T @ r), *conditions)}
-        shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "R_z": (n, n_z), "F_in": (n, len(m.inputs)), "Z_q": (n_z, n),
-                  "Z_u": (n_z, n), "Z_z": (n_z, n_z), "Z_in": (n_z, len(m.inputs))}
+        shapes = {"M": (n_s, n_s), "C": (n_s, n_s), "K": (n_s, n), "E": (n, n_s), "W": (n, n), "R_z": (n_s, n_z),
+                  "F_in": (n_s, len(m.inputs)), "Z_q": (n_z, n), "Z_u": (n_z, n_s), "Z_z": (n_z, n_z),
+                  "Z_in": (n_z, len(m.inputs))}
         nodes = {name: m.at(value, self.values).reshape(shapes.get(name, (-1,))) for name, value in nodes.items()}
-        self._demand_constant(nodes)
+        self._demand_constant({**nodes, "what the constraints determine": m.at([*Z.ravel(), *Z_w.ravel()], self.values)})
         s = equations.symbols
         names = s.coordinates if m.plain else s.speeds
-        independent = [k for k in free if k not in self.dependent]
         about = {key: sp.sympify(value, strict=True) for key, value in self.about.items()}
-        return Linearized(equations.name, tuple(names[k] for k in independent), s.inputs, s.states, about, nodes, self.symbols)
+        return Linearized(equations.name, tuple(names[k] for k in by.displacements), tuple(s.speeds[k] for k in by.speeds),
+                          tuple(map(by.displacements.index, by.speeds)), s.inputs, s.states, about, nodes, self.symbols)
 
     def _by(self, entries: Any, leaves: Sequence[Node]) -> np.ndarray:
         columns = [self.m.by(entries, leaf) for leaf in leaves]
         return np.array(columns, dtype=object).T.reshape(len(entries), len(leaves)) if columns else zeros(len(entries), 0)
 
-    def _unconstrained(self, free: Sequence[int]) -> tuple[np.ndarray, list[Any]]:
-        Z = zeros(len(self.m.u), len(free))
-        for j, k in enumerate(free):
-            Z[k, j] = 1
-        return Z, []
-
-    def _constrained(self, r: np.ndarray, C: np.ndarray, lam: Sequence[Node], free: Sequence[int],
-                     ) -> tuple[np.ndarray, list[Any]]:
-        """Z with C_r Z = 0 and the constraints; the multipliers become values."""
-        m, equations = self.m, self.equations
-        if not all(equations.holonomic):
-            names = [n for n, holonomic in zip(equations.constraints, equations.holonomic, strict=True) if not holonomic]
-            verb = "constrains" if len(names) == 1 else "constrain"
-            raise SymdynError(f"{equations.name}: linear equations in symbols were requested, but {', '.join(names)} {verb} "
-                              "velocities and no positions, so that more displacements are free than speeds, and there is no "
-                              "M eta_ddot + C eta_dot + K eta; use module.linearize(at), whose A and B hold displacements and "
-                              "speeds of their own number")
-        if not all(map(is_zero, self._by(C, m.inputs).ravel())):
+    def _constrained(self, r: np.ndarray, N: np.ndarray, free: Sequence[int]) -> tuple[Reduced, list[Any]]:
+        """What the constraints leave free, and what makes the speeds fulfil them and stay; the multipliers become values."""
+        m, equations, lam = self.m, self.equations, self.state.multipliers
+        rates, second = m.constraint_rates()
+        C = m.statics()[1]
+        if not all(map(is_zero, self._by([*C, *rates], m.inputs).ravel())):
             raise SymdynError(f"{equations.name}: linear equations in symbols were requested, but inputs stand in its "
                               "constraints; use module.linearize(at)")
-        C_r = m.at(equations.quantity("C_r"), self.values)
-        self.dependent = self._dependent(C_r, free)
-        d, i = list(self.dependent), [k for k in free if k not in self.dependent]
-        Z = zeros(len(m.u), len(i))
-        if d:
-            Z[d] = -solve(C_r[:, d], C_r[:, i])
-        for j, k in enumerate(i):
-            Z[k, j] = 1
+        A, A_q = (m.at(self._by(rates, leaves), self.values) for leaves in (m.u, m.q))
+        by = reduced(equations, A, A_q, N, free, self.symbols, self.wanted)
+        d = list(by.dependent)
         unloaded = m.at(r, {**self.values, **dict.fromkeys(lam, 0)})
-        self.values.update(zip(lam, -solve(C_r[:, d].T, unloaded[d]), strict=True))
-        return Z, list(C)
-
-    def _dependent(self, C_r: np.ndarray, free: Sequence[int]) -> list[int]:
-        """Speeds, the last ones first, whose columns are independent for parameters in general."""
-        tape = Tape.of(self.m.recorder, C_r=C_r)
-        values = drawn_state(random.Random(5), tape.inputs, 0.2, self.symbols)
-        numbers = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)["C_r"].astype(float)
-        chosen: list[int] = []
-        for k in reversed(free):
-            if np.linalg.matrix_rank(numbers[:, [*chosen, k]], tol=1e-9) > len(chosen):
-                chosen.append(k)
-        if len(chosen) < len(C_r):
-            raise SymdynError(f"{self.equations.name}: its {len(C_r)} constraints have rank {len(chosen)} at the state, so that "
-                              "the multipliers are not unique; leave out those that others imply (system.diagnose() names them), "
-                              "or use module.linearize(at)")
-        return sorted(chosen)
+        self.values.update(zip(lam, -solve(A[:, d].T, unloaded[d]), strict=True))
+        return by, [*rates, *second]
 
     def _demand_smooth(self, entries: Sequence[Any]) -> None:
         """Raises SymdynError where the equations have a kink or jump at the state: their changes on both sides differ.

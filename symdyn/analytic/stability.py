@@ -62,7 +62,7 @@ class Stability:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Characteristic:
-    """det(M s^2 + C s + K), with the rows of extra states where there are any.
+    """det(M s^2 + C s + K), with the rows of extra states and of displacements beyond the speeds, where there are any.
 
     coefficients   in the shortest form, of the highest power first
     """
@@ -101,7 +101,8 @@ class Characteristic:
             return Stability((), "undecided", zero, self.linear.conditions)
         if all(map(is_zero, left[1::2])) and degree % 2 == 0:
             # Without gyroscopic and circulatory terms all s^2 are real.
-            real = self.linear.C.is_zero_matrix and self.linear.K.is_symmetric() and self.linear.M.is_symmetric()
+            linear = self.linear
+            real = linear.holonomic and linear.C.is_zero_matrix and linear.K.is_symmetric() and linear.M.is_symmetric()
             kind, found = "neutral", list(left[:-1:2]) if real else _negative_and_real(left[::2])
         else:
             kind, found = "asymptotic", _lienard_chipart(left[::-1])
@@ -110,16 +111,22 @@ class Characteristic:
 
 def characteristic(linear: Linearized) -> Characteristic:
     """The characteristic polynomial. Raises SymdynError for what is too large."""
-    get, n, n_z = linear.nodes, len(linear.coordinates), len(linear.states)
+    get, n, n_s, n_z = linear.nodes, len(linear.coordinates), len(linear.speeds), len(linear.states)
+    # Displacements whose rates are the independent speeds, first; zeta is s times these.
+    first = linear.rated
+    last = [i for i in range(n) if i not in first]
     rows: list[list[Polynomial]] = []
-    for i in range(n):
-        rows.append([*[(get["K"][i, j], get["C"][i, j], get["M"][i, j]) for j in range(n)],
-                     *[(get["R_z"][i, j],) for j in range(n_z)]])
+    for i in range(n_s):
+        rows.append([*[(get["K"][i, k], get["C"][i, j], get["M"][i, j]) for j, k in enumerate(first)],
+                     *[(get["K"][i, k],) for k in last], *[(get["R_z"][i, j],) for j in range(n_z)]])
+    for i in last:
+        rows.append([*[(-get["W"][i, k], -get["E"][i, j]) for j, k in enumerate(first)],
+                     *[(-get["W"][i, k], int(i == k)) for k in last], *[(0,)] * n_z])
     for i in range(n_z):
-        rows.append([*[(-get["Z_q"][i, j], -get["Z_u"][i, j]) for j in range(n)],
-                     *[(-get["Z_z"][i, j], int(i == j)) for j in range(n_z)]])
+        rows.append([*[(-get["Z_q"][i, k], -get["Z_u"][i, j]) for j, k in enumerate(first)],
+                     *[(-get["Z_q"][i, k],) for k in last], *[(-get["Z_z"][i, j], int(i == j)) for j in range(n_z)]])
     nodes = determinant(rows, _plus, _times, lambda p: tuple(-c for c in p), (0,), (1,), lambda p: all(map(is_zero, p)))
-    degree = 2 * n + n_z
+    degree = n + n_s + n_z
     nodes = (*nodes, *[0] * (degree + 1 - len(nodes)))[:degree + 1]
     return Characteristic(linear, nodes, tuple(linear.write(nodes[::-1])))
 

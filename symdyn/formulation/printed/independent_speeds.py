@@ -136,15 +136,16 @@ class MotionEquations(Equations):
 
         return conserved(self, undriven)
 
-    def linearized(self, about: Named[Scalar] | None = None, hold: Names = ()) -> Linearized:
+    def linearized(self, about: Named[Scalar] | None = None, hold: Names = (), coordinates: Names = ()) -> Linearized:
         """M, C, K, A, B about a state of rest or a steady motion, explicit in the parameters, with its conditions.
 
         about   coordinates, speeds, states, inputs by symbol or name -> numbers or expressions in parameters; left out: zero
         hold    coordinates or speeds that are held
+        coordinates   those that are to be independent under constraints; default: the first ones that are
         See symdyn.analytic.linear. Raises ArgumentError, and SymdynError for what has no constant linear equations."""
         from symdyn.analytic.linear import linearized
 
-        return linearized(self, about, hold)
+        return linearized(self, about, hold, coordinates)
 
     def equilibria(self, fixed: Named[Scalar] | None = None, values: Named[Scalar] | None = None) -> EquilibriumPoints:
         """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
