@@ -210,7 +210,12 @@ class Writer:
             found = found[:2]
         else:
             found += [p for p in (halved(p, self.letters) for p in found) if p is not None]
-        return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
+        trees = [tree for p in found for tree in self._arranged(p)]
+        if value.under:
+            # The denominator below all of it, which leaves factors of the numerator whole.
+            (below, sign), = self._over({(): 1}, value).items()
+            trees.append(a.times(sign, below, [(self.tree(Value(value.num)), 1)]))
+        return min(map(a.signed, trees), key=total)
 
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
         if not value.under:
