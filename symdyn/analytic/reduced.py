@@ -112,7 +112,8 @@ class _Choice:
                     np.linalg.matrix_rank(numbers[:, [*found, k]], tol=RANK) > len(found)):
                 found.append(k)
         if len(found) < len(numbers):
-            raise SymdynError(f"{self.name}: its {len(numbers)} constraints have rank {len(found)} at the state, so that "
+            held = " in the speeds that are not held" if len(free) < numbers.shape[1] else ""
+            raise SymdynError(f"{self.name}: its {len(numbers)} constraints have rank {len(found)}{held} at the state, so that "
                               "the multipliers are not unique; leave out those that others imply (system.diagnose() names them), "
                               "or use module.linearize(at)")
         return sorted(found)

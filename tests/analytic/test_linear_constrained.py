@@ -188,6 +188,8 @@ def test_faults():
     with pytest.raises(ArgumentError, match="coordinates are to be independent, but z_dot cannot be at this state; independent "
                                             "are 3 speeds, such as"):
         eq.linearized(about, coordinates=["z"])
+    with pytest.raises(SymdynError, match="its 1 constraints have rank 0 in the speeds that are not held at the state"):
+        sd.systems.get("skate").augmented().linearized(hold=["y", "theta"])
     system = sd.System("ball")
     body = system.add_body("body", mass=m, inertia=[A, A, A])
     system.add_joint(sd.Spherical("body", system.ground, body, orientation=sd.EulerAngles("ZYX", speeds="body")))
