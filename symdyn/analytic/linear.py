@@ -474,9 +474,9 @@ class _Linearization:
                 slopes = [(e, 0) for e in self.m.by(value.ravel(), leaf) if isinstance(e, Node) or e]
                 if slopes and not decide(equations.recorder, slopes, self.symbols).proved:
                     symbol = equations.printed_leaves().get(leaf, leaf.args[1])
-                    drifts = symbol in self.drifting
-                    what = (f"{symbol} goes on at the speed {self.about[symbol.dot]}, and {name} holds it" if drifts
-                            else f"{name} holds {symbol}")
+                    drifts, holder = symbol in self.drifting, "a condition of it" if name == "conditions" else name
+                    what = (f"{symbol} goes on at the speed {self.about[symbol.dot]}, and {holder} holds it" if drifts
+                            else f"{holder} holds {symbol}")
                     raise SymdynError(f"{equations.name}: the linear equations are not constant: {what}; "
                                       + (f"give about a steady motion, in which only cyclic coordinates move, or hold {symbol}"
                                          if drifts else "use module.linearize(at, t=...)"))
