@@ -921,16 +921,21 @@ class Module:
 
     def periodic(self, period: float, q: Values | None = None, u: Values | None = None, params: Values | None = None, *,
                  z: Values | None = None, t: float = 0.0, inputs: Values | None = None,
-                 advance: Numbers | None = None, rtol: float = 1e-10, method: str = "dop853") -> PeriodicMotion:
+                 advance: Numbers | None = None, cyclic: Names | None = None,
+                 exchange: Sequence[tuple[Key, Key]] | None = None, rtol: float = 1e-10,
+                 method: str = "dop853") -> PeriodicMotion:
         """A periodic motion near a start, by shooting with exact sensitivities.
 
         period    s: where the time appears in the equations that of the motion, else a guess, found with the start
         q, u, z   near the motion, as for `simulate`; t: the time there; inputs: constants
         advance   what coordinates gain in a period, by name or symbol: 2 pi for a wheel that turns once
+        cyclic    coordinates that nothing depends on and that need not come back, such as the way of a walker
+        exchange  pairs of coordinates that have changed roles after a period, with their speeds: the legs of a walker, whose step
+                  is a period then
         rtol, method   of the integration, a compiled method
 
-        On constraints and across events, such as the impacts of a walker, whose resets are given; see
-        symdyn.statics.periodic.PeriodicMotion for the multipliers, and `follow`, over a parameter. Raises NoEquilibrium where
+        On constraints, across events and across the switches and impacts of rigid contacts; the start lies between two of these.
+        See symdyn.statics.periodic.PeriodicMotion for the multipliers, and `follow`, over a parameter. Raises NoEquilibrium where
         none is found, with what is left, ArgumentError for what does not fit.
 
         >>> q = sd.coordinates("q")
@@ -943,8 +948,8 @@ class Module:
         """
         from symdyn.statics.periodic import periodic
 
-        self._demand_no_rigid_contacts("periodic motions")
-        return periodic(self, period, q, u, params, z=z, t=t, inputs=inputs, advance=advance, rtol=rtol, method=method)
+        return periodic(self, period, q, u, params, z=z, t=t, inputs=inputs, advance=advance, cyclic=cyclic, exchange=exchange,
+                        rtol=rtol, method=method)
 
     def campbell(self, speed: Key, values: Times, free: Names | None = None, fixed: Numbers | None = None,
                  start: Start | None = None, params: Values | None = None, t: float = 0.0, inputs: Values | None = None,

@@ -14,7 +14,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.real_numbers import number_of
-from symdyn.runtime.integrating.stabilization import ProjectionFailed, Projector
+from symdyn.runtime.integrating.stabilization import ProjectionFailed
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class _Point:
         p = motion.params[place] + length * self.tangent[-1] * self.sizes[-1]
         for iteration in range(ITERATIONS):
             try:
-                x = Projector(motion.module, _with(motion, place, p).p)(motion._problem.t, start)
+                x = _with(motion, place, p).start(start)
                 shot, slide = _shot(motion, place, x, period, p)
             except (EvaluationError, ProjectionFailed, ArgumentError):
                 return None
@@ -135,7 +135,8 @@ def _shot(motion: PeriodicMotion, place: int, x: np.ndarray, period: float, p: f
     problem = _with(motion, place, p)
     shot = problem.shot(x, period)
     by = problem.solution(x, period, 2, [motion.module.metadata.parameters[place]]).sensitivity.matrix[:, :, 0]
-    columns = [shot.moved - shot.basis, *([shot.late[:, None]] if motion.free_period else []), (by[-1] - by[0])[:, None]]
+    by_p = problem.back @ by[-1] - problem.keeps * by[0]
+    columns = [shot.moved - shot.basis, *([shot.late[:, None]] if motion.free_period else []), by_p[:, None]]
     matrix = np.hstack(columns)
     if motion.free_period:
         along = shot.basis.T @ shot.rate

@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.arguments import some
+from symdyn.arguments import some, take
+from symdyn.contact_kinds import CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium, SimulationWarning
 from symdyn.real_numbers import number_of, real_of
+from symdyn.runtime.contact_laws import OPEN, STICKING
+from symdyn.runtime.integrating.contacts import onto_rows, rows_of
 from symdyn.runtime.integrating.simulate import start_of
 from symdyn.runtime.integrating.stabilization import ProjectionFailed, Projector
 from symdyn.runtime.masses import real_parameters
@@ -35,6 +38,8 @@ CLOSED = 1e3
 LEFT_OUT = (1e-9, 1e-4)
 # Directions that a start may change in: singular values of the projection beyond this part of the largest.
 TANGENT = 1e-6
+# What a change of a cyclic coordinate may change of the rest, by its size.
+CYCLIC = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +120,8 @@ class PeriodicMotion:
 
 
 def periodic(module: Module, period: Any, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: float = 0.0,
-             inputs: Any = None, advance: Any = None, rtol: float = 1e-10, method: str = "dop853") -> PeriodicMotion:
+             inputs: Any = None, advance: Any = None, cyclic: Any = None, exchange: Any = None, rtol: float = 1e-10,
+             method: str = "dop853") -> PeriodicMotion:
     """See Module.periodic."""
     metadata = module.metadata
     guess = number_of(period, module.name, "the period must be a number of seconds")
@@ -126,9 +132,44 @@ def periodic(module: Module, period: Any, q: Any = None, u: Any = None, params: 
     turns = some(advance, list(metadata.x), "advance", module.name)
     begin = number_of(t, module.name, "t must be a finite time")
     arguments = module.unit("rhs").metadata.arguments
-    free = not any("t" in arguments.get(name, ()) for name in ("rhs", "events", "event_resets"))
+    free = not any("t" in arguments.get(name, ()) for name in ("rhs", "events", "event_resets", "contacts"))
     moves = np.array([turns.get(name, 0.0) for name in metadata.x])
-    return _Problem(module, p, begin, inputs, moves, rtol, method, free).solve(start_of(module, q, u, z), guess)
+    left_out = _names(module, cyclic, "cyclic")
+    keeps = np.array([float(name not in left_out) for name in metadata.x])
+    back = keeps[:, None] * np.eye(len(keeps))[_exchanged(module, exchange)]
+    problem, start = _Problem(module, p, begin, inputs, moves, rtol, method, free, keeps, back), start_of(module, q, u, z)
+    if metadata.contacts:
+        problem = replace(problem, modes=problem.solution(start, guess, 2)._phases[0].modes)
+    return problem.solve(start, guess)
+
+
+def _names(module: Module, given: Any, what: str) -> list[str]:
+    """Entries of the state by symbols or names. Raises ArgumentError for others."""
+    if given is None:
+        return []
+    if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+        raise ArgumentError(f"{module.name}: {what} is {shown(given)}; pass a list of names, such as ['{module.metadata.x[0]}']")
+    found = [name_of(one) for one in given]
+    strange = [shown(name) for name in found if name not in module.metadata.x]
+    if strange:
+        raise ArgumentError(f"{module.name}: {what} names {', '.join(strange)}; there are {', '.join(module.metadata.x)}")
+    return found
+
+
+def _exchanged(module: Module, given: Any) -> list[int]:
+    """The order of the state with pairs of coordinates exchanged, and with them their speeds."""
+    names = list(module.metadata.x)
+    order = list(range(len(names)))
+    for pair in given or ():
+        two = _names(module, pair, "a pair to exchange")
+        if len(two) != 2 or two[0] == two[1]:
+            raise ArgumentError(f"{module.name}: a pair to exchange is {shown(pair)}; pass two coordinates, such as ('left', "
+                                "'right')")
+        for a, b in ((two[0], two[1]), (f"{two[0]}_dot", f"{two[1]}_dot")):
+            if a in names and b in names:
+                i, j = names.index(a), names.index(b)
+                order[i], order[j] = order[j], order[i]
+    return order
 
 
 @dataclass(frozen=True)
@@ -141,10 +182,13 @@ class _Problem:
     rtol: float
     method: str
     free: bool
+    keeps: np.ndarray  # of the entries of the state 1 where they come back, 0 where they gain what they gain, (n_x,)
+    back: np.ndarray  # (n_x, n_x): from the end of a period to the start of the next one
+    modes: tuple[str, ...] = ()  # of rigid contacts at the start
 
     def solve(self, x: np.ndarray, period: float) -> PeriodicMotion:
         """The periodic motion near a start and a period."""
-        x = Projector(self.module, self.p)(self.t, x)
+        x = self.start(x)
         here = self.shot(x, period)
         scale, enough = _size(x, here.end), self.enough(x, here.end)
         for iteration in range(ITERATIONS):
@@ -160,6 +204,21 @@ class _Problem:
                             f"{here.period:.6g} s {self.module.metadata.x[worst]} is off by {here.gap[worst]:.3g}; begin nearer "
                             "to it, with a state that a simulation has settled to")
 
+    def start(self, x: np.ndarray) -> np.ndarray:
+        """The start nearby on the constraints and on the surfaces of contacts that are closed."""
+        x, records = Projector(self.module, self.p)(self.t, x), self.module.metadata.contacts
+        closed = [(k, rows) for k, (rows, mode) in enumerate(zip(rows_of(records), self.modes, strict=False)) if mode != OPEN]
+        if not closed:
+            return x
+        gaps = {k: rows[0] for k, rows in closed if records[k].normal and records[k].kind != CLUTCH}
+        held = [row for k, rows in closed
+                for row in (rows if self.modes[k] == STICKING else rows[:records[k].normal])]
+        given = () if self.inputs is None else self.inputs
+        inputs = take(given, self.module.metadata.inputs, "inputs", self.module.metadata.initial, self.module.name)
+        for _ in range(3):
+            x = onto_rows(self.module, self.t, x, self.p, inputs, gaps, held)
+        return Projector(self.module, self.p)(self.t, x)
+
     def enough(self, x: np.ndarray, end: np.ndarray) -> float:
         """The gap of a motion that counts as closed."""
         return CLOSED * self.rtol * _size(x, end)
@@ -170,7 +229,7 @@ class _Problem:
         part = min(part, 0.5 * max(scale, 1.0) / max(np.abs(step[:-1]).max(), 1e-300))
         for _ in range(HALVINGS):
             try:
-                x = Projector(self.module, self.p)(self.t, here.x + part * step[:-1])
+                x = self.start(here.x + part * step[:-1])
                 there = self.shot(x, here.period + part * step[-1])
             except (EvaluationError, ProjectionFailed):
                 there = None
@@ -183,14 +242,25 @@ class _Problem:
         """Where a start is after a period, with what it depends on. Raises EvaluationError where the motion stops early."""
         run = self.solution(x, period, 2, [f"{name}(0)" for name in self.module.metadata.x])
         S = run.sensitivity.matrix
-        left, sizes, _ = np.linalg.svd(S[0])
+        self.check_cyclic(S[-1])
+        left, sizes, _ = np.linalg.svd(self.keeps[:, None] * S[0])
         basis = left[:, sizes > TANGENT * sizes[0]]
-        return _Shot(x, period, run.x[-1], S[-1] @ basis, basis, run.x[-1] - x - self.moves,
-                     self.rate(self.t, x), self.rate(self.t + period, run.x[-1]))
+        before, after = (run._phases[0].p, run._phases[-1].p) if run._phases else (self.p, self.p)
+        return _Shot(x, period, run.x[-1], self.back @ S[-1] @ basis, basis, self.back @ run.x[-1] - self.keeps * x - self.moves,
+                     self.keeps * self.rate(self.t, x, before), self.back @ self.rate(self.t + period, run.x[-1], after))
 
-    def rate(self, t: float, x: np.ndarray) -> np.ndarray:
+    def check_cyclic(self, S: np.ndarray) -> None:
+        """Raise ArgumentError for coordinates that were said to be cyclic and are not; S: derivatives of the end."""
+        for k in np.flatnonzero(self.keeps == 0):
+            moved = np.abs(S[:, k] - np.eye(len(S))[k]).max()
+            if moved > CYCLIC:
+                name = self.module.metadata.x[k]
+                raise ArgumentError(f"{self.module.name}: {name} was given as cyclic, but the motion depends on it: a change of "
+                                    f"its start changes the end by {moved:.3g} times as much more; leave it out of cyclic")
+
+    def rate(self, t: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
         inputs = () if self.inputs is None else self.inputs
-        return self.module.evaluate("rhs", t, x, self.p, inputs)
+        return self.module.evaluate("rhs", t, x, p, inputs)
 
     def solved(self, at: _Shot, right: np.ndarray, left_out: float = 1e-9) -> np.ndarray:
         """Changes of the start and of the period by which what is left after a period changes as given, the smallest ones;
@@ -211,7 +281,7 @@ class _Problem:
     def derivative(self, x: np.ndarray, period: float, name: str) -> np.ndarray:
         """Derivatives of the start and of the period by a parameter, (n_x + 1,)."""
         by = self.solution(x, period, 2, [name]).sensitivity[name]
-        found = self.solved(self.shot(x, period), by[0] - by[-1])
+        found = self.solved(self.shot(x, period), self.keeps * by[0] - self.back @ by[-1])
         return found + np.append(by[0], 0.0)
 
     def found(self, at: _Shot, iterations: int) -> PeriodicMotion:

@@ -38,6 +38,8 @@ class Contact:
     impact        law of rigid impacts: "newton" (velocities), "poisson" (impulses of compression and expansion) or "stronge"
                   (their energies; one contact at a time, with friction in a plane)
     compliance    how a compliant contact yields, sd.contacts.Compliance(...)
+    ignored       an expression; while it is positive a rigid contact that is open does not close, however deep it goes: the foot
+                  of a straight leg that scuffs in mid-swing. None: it always counts
 
     A rigid contact is open as long as its gap is positive. Closed, it transmits a normal force N >= 0 and in its tangential
     directions (one in a plane, two in space) a friction force of at most static times N while it sticks, and of kinetic times N
@@ -50,7 +52,7 @@ class Contact:
 
     def __init__(self, name: str, a: BodyOrName, b: BodyOrName, shape: Shape | tuple[Shape, Counterpart] = ORIGIN_OF_A,
                  friction: Scalar | tuple[Scalar, Scalar] = 0, restitution: Scalar = 0, law: str = "rigid",
-                 impact: str = "newton", compliance: Compliance | None = None) -> None:
+                 impact: str = "newton", compliance: Compliance | None = None, ignored: Scalar | None = None) -> None:
         self.name, self.a, self.b, self.law, self.impact = name, a, b, law, impact
         self.compliance = compliance
         self.faults = faults = Faults()
@@ -66,12 +68,15 @@ class Contact:
         self.on_a: Any = pair[0]
         self.on_b: Any = pair[1]
         self.static, self.kinetic, self.restitution = coefficients(faults, where, friction, restitution)
+        self.ignored = None if ignored is None else faults.expression(ignored, f"{where}: ignored")
         if law not in LAWS:
             faults.append(f"{where}: law is {shown(law)}; there are {', '.join(map(repr, LAWS))}")
         if impact not in IMPACTS:
             faults.append(f"{where}: impact is {shown(impact)}; there are {', '.join(map(repr, IMPACTS))}")
         if law == "compliant" and self.restitution != 0:
             faults.append(f"{where}: restitution belongs to rigid contacts; pass the dissipation of the compliance")
+        if law == "compliant" and ignored is not None:
+            faults.append(f"{where}: ignored belongs to rigid contacts, which close at an instant; leave it out")
         if law != "compliant" and compliance is not None:
             faults.append(f"{where}: compliance belongs to law='compliant'; pass that law, or leave compliance out")
 

@@ -29,7 +29,7 @@ from symdyn.model.symbols import Coordinate
 if TYPE_CHECKING:
     from symdyn.model.system import System
 
-CLOSES, OPENS, STICKS, SLIPS, TURNS = "closes", "opens", "sticks", "slips", "turns"
+CLOSES, OPENS, STICKS, SLIPS, TURNS, IGNORED, COUNTS = "closes", "opens", "sticks", "slips", "turns", "ignored", "counts"
 # A speed, m/s, with which the direction of friction is still known where a contact begins to slip.
 SLOW = sp.Rational(1, 10**12)
 # Added to the diagonal of the rows that hold, by their size, where they depend on each other.
@@ -168,12 +168,14 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
     events = {CLOSES: touch.gap, OPENS: forces[0], **of_sliding}
     if len(rows) > 1:
         events[SLIPS] = (contact.static * forces[0]) ** 2 - sp.Add(*[f**2 for f in forces[1:]])
+    if contact.ignored is not None:
+        events |= {IGNORED: contact.ignored, COUNTS: contact.ignored}
     system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
                                               tuple(events), at=geometry.place(touch), acting=_along(directions, forces)))
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
-        system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
+        system.events.append(Event(f"{name}_{what}", value, 1 if what == IGNORED else -1, True, ()))
 
 
 def _add_row(system: System, element: JointElement, row: Row) -> None:

@@ -9,7 +9,7 @@ accelerations.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -48,7 +48,7 @@ NO_SPEED = 1e-11
 MOST_SWITCHES, SAME_TIME = 50, 1e-13
 # What is added to the diagonal of rows that depend on each other, by its size.
 SOFTNESS = 1e-8
-STRONGE = "stronge"
+STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
 # The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
@@ -93,18 +93,57 @@ def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
                    parts[5].reshape(-1, n))
 
 
+def onto_rows(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any, gaps: Mapping[int, int],
+              held: Sequence[int]) -> np.ndarray:
+    """A state whose gaps are zero and whose velocities along rows are none, to first order, by the smallest change in the metric
+    of the mass matrix.
+
+    gaps   places of contacts with that of their normal row; held: places of rows
+    """
+    n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
+    at, normal, x = numbers(module, t, x, p, inputs), list(gaps.values()), x.copy()
+    if gaps:
+        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[list(gaps)], rcond=1e-10)[0]
+        if np.abs(push).max(initial=0.0) > 0:
+            x[:n_q] += at.coordinates[:, normal] @ push
+            at = numbers(module, t, x, p, inputs)
+    if held:
+        stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
+        x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
+    return x
+
+
+def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> list[bool]:
+    """Whether each contact is ignored at a state, should it be open."""
+    places = {event.name: k for k, event in enumerate(module.metadata.events)}
+    own = [places[f"{record.name}_{IGNORED}"] if IGNORED in record.events else -1 for record in module.metadata.contacts]
+    if max(own) < 0:
+        return [False] * len(own)
+    values = module.evaluate("events", t, x[:module.metadata.sizes.x], p, inputs)
+    return [k >= 0 and bool(values[k] > 0) for k in own]
+
+
+def check_counted(module: Module) -> None:
+    """Raise ArgumentError for contacts that are ignored at times, where steps of one length go across switches."""
+    names = [record.name for record in module.metadata.contacts if IGNORED in record.events]
+    if names:
+        raise ArgumentError(f"{module.name}: contacts {', '.join(names)} are ignored at times, which method='moreau' does not "
+                            "know; leave out the method, and switches are located")
+
+
 def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
     """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not."""
-    at = numbers(module, t, x, p, inputs)
-    deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and module.metadata.contacts[k].kind != CLUTCH]
+    at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
+    passed = ignored(module, t, x, p, inputs)
+    counts = [record.kind != CLUTCH and not other for record, other in zip(records, passed, strict=True)]
+    deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and counts[k]]
     if not deep:
         return
-    records = module.metadata.contacts
     first = [rows[0] for rows in rows_of(records)]
     moved, n_q = x.copy(), module.metadata.sizes.q
     for _ in range(20):
         now = numbers(module, t, moved, p, inputs)
-        below = [k for k, gap in enumerate(now.gap) if gap < 0 and records[k].kind != CLUTCH]
+        below = [k for k, gap in enumerate(now.gap) if gap < 0 and counts[k]]
         if not below:
             break
         places = [first[k] for k in below]
@@ -112,8 +151,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
         moved[:n_q] += now.coordinates[:, places] @ push
     depths = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
     names = module.metadata.q
-    lifted = all(gap >= -TOUCHING for gap, record in zip(numbers(module, t, moved, p, inputs).gap, records, strict=True)
-                 if record.kind != CLUTCH)
+    lifted = all(gap >= -TOUCHING for k, gap in enumerate(numbers(module, t, moved, p, inputs).gap) if counts[k])
     remedy = "start from q = {" + ", ".join(f"{name}: {value:.9g}" for name, value, old in zip(
         names, moved[:n_q], x[:n_q], strict=True) if value != old) + "}, where they touch" if lifted else "start further apart"
     raise ArgumentError(f"{module.name}: contacts overlap at the start: {depths}; {remedy}")
@@ -196,6 +234,7 @@ class _Phases:
         self.modes = [OPEN] * n
         self.directions = [np.zeros(record.tangents) for record in self.records]
         self.still = [False] * n  # whether the slip of a closed contact is zero
+        self.passed = [False] * n  # whether an open contact is ignored
         self.size = 0.0  # of coordinates and gaps
         self.fresh = [False] * n  # whether it has just begun to slip
         self.shared = False
@@ -258,7 +297,7 @@ class _Phases:
         at = self._numbers(t, x)
         for k, (record, mode) in enumerate(zip(self.records, self.modes, strict=True)):
             size = max(1.0, float(np.abs(at.slip).max())) if k in self.clutches else self.size
-            if mode == OPEN and at.gap[k] < -MISSED * size:
+            if mode == OPEN and not self.passed[k] and at.gap[k] < -MISSED * size:
                 what = "turns back" if k in self.clutches else "overlaps"
                 raise _Stop(f"contact {record.name} {what} by {-at.gap[k]:.3g}{' m' * (record.kind == BODIES)}, since the "
                             "instant at which it closed was missed; give event_spacing, or a finer rtol")
@@ -351,8 +390,9 @@ class _Phases:
         request = self.request
         n = len(self.module.metadata.events)
         look = np.zeros(n, dtype=bool) if request.look is None else request.look.copy()
-        for own, mode, record in zip(self.events, self.modes, self.records, strict=True):
-            wanted = {OPEN: ("closes",), STICKING: ("opens", "slips"), SLIDING: ("opens", "sticks", "turns")}[mode]
+        for own, mode, record, passed in zip(self.events, self.modes, self.records, self.passed, strict=True):
+            wanted = {OPEN: (COUNTS,) if passed else ("closes", IGNORED), STICKING: ("opens", "slips"),
+                      SLIDING: ("opens", "sticks", "turns")}[mode]
             for what, k in own.items():
                 look[k] = what in wanted and k not in self.unlooked
             if mode == SLIDING and record.sticking and not self.directions[self.records.index(record)].any():
@@ -388,7 +428,8 @@ class _Phases:
     def _timed(self, fired: Sequence[tuple[int, str]]) -> dict[int, str]:
         """The contacts whose events set the time of the latest switch, with the event. A slip that only turns changes nothing."""
         found = {}
-        for k, what in sorted(fired, key=lambda one: FIRST.index(one[1]), reverse=True):
+        timed = [one for one in fired if one[1] in FIRST]  # the others change nothing in the motion
+        for k, what in sorted(timed, key=lambda one: FIRST.index(one[1]), reverse=True):
             if what != "turns":
                 found[k] = what
             elif self.modes[k] == STICKING:
@@ -418,6 +459,8 @@ class _Phases:
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
         x = x.copy()
+        turned = {k for k, what in fired if what in (IGNORED, COUNTS)}  # where what they are ignored by is at its zero
+        self._pass_by(t, x, self._ignored(t, x) if start else [one != (k in turned) for k, one in enumerate(self.passed)])
         for k, what in fired:
             if what == "sticks":
                 self.still[k] = True
@@ -438,7 +481,7 @@ class _Phases:
         near = TOUCHING if start else TOGETHER * max(1.0, float(np.abs(x[:self.request.n_state]).max(initial=0.0)))
         for k, mode in enumerate(self.modes):
             v = at.slip[self.normal[k]]
-            if mode != OPEN or k in closing or not self.records[k].normal:
+            if mode != OPEN or k in closing or self.passed[k] or not self.records[k].normal:
                 continue
             if (abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0)) or (k in self.clutches and v < -TOUCHING):
                 closing.add(k)
@@ -466,7 +509,23 @@ class _Phases:
             self.made.append(Made(tuple(self.modes), tuple(self.still)))
             x = self._onto_surfaces(t, x)
             self._choose(t, self._numbers(t, x), closed)
+        self._pass_by(t, x, [self.passed[k] if k in turned else now for k, now in enumerate(self._ignored(t, x))])
         return x
+
+    def _ignored(self, t: float, x: np.ndarray) -> list[bool]:
+        return ignored(self.module, t, x, self.request.p, self.request.inputs.at(t, x[:self.request.n_state]))
+
+    def _pass_by(self, t: float, x: np.ndarray, passed: list[bool]) -> None:
+        """Note which contacts are ignored; raise _Stop for those that overlap where that ends."""
+        ended = [k for k, (old, now) in enumerate(zip(self.passed, passed, strict=True)) if old and not now]
+        self.passed = passed
+        if not ended:
+            return
+        gaps = self._numbers(t, x).gap
+        for k in ended:
+            if self.modes[k] == OPEN and gaps[k] < -MISSED * self.size:
+                raise _Stop(f"contact {self.records[k].name} overlaps by {-gaps[k]:.3g} m where it is no longer ignored; let "
+                            "`ignored` stay positive until its gap is open")
 
     def _slow(self, at: Numbers, k: int) -> bool:
         """Whether a contact does not slip."""
@@ -479,21 +538,11 @@ class _Phases:
         closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
         if not closed:
             return x
-        n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
-        at = self._numbers(t, x)
-        placed = [k for k in closed if k in self.placed]
-        normal = [self.normal[k] for k in placed]
-        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[placed], rcond=1e-10)[0] if placed else np.zeros(0)
-        if np.abs(push).max(initial=0.0) > 0:
-            x[:n_q] += at.coordinates[:, normal] @ push
-            at = self._numbers(t, x)
+        gaps = {k: self.normal[k] for k in closed if k in self.placed}
         held = [self.normal[k] for k in closed if self.records[k].normal]
         held += [row for k in closed if self.still[k] for row in self.tangents[k]]
-        if not held:
-            return x
-        stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
-        x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
-        return x
+        inputs = self.request.inputs.at(t, x[:self.request.n_state])
+        return onto_rows(self.module, t, x, self.request.p, inputs, gaps, held)
 
     def _impact(self, t: float, x: np.ndarray, at: Numbers, touching: Sequence[int],
                 hit: Sequence[int]) -> tuple[np.ndarray, list[int]]:
