@@ -29,7 +29,8 @@ OMEGA = r"\omega"
 @dataclass(frozen=True)
 class Measure:
     """What a Quantity is: its kind, the names of its bodies (or of its joint, or constraint), points on them, body axes, the
-    component, how often it is differentiated by time, and the body in whose axes components of a reaction are taken."""
+    component, how often it is differentiated by time, the body in whose axes components of a reaction are taken, and the unit
+    of the force of a contact."""
 
     kind: str
     of: tuple[str, ...]
@@ -37,6 +38,7 @@ class Measure:
     index: tuple[int, ...] = ()
     order: int = 0
     frame: str | None = None
+    force: str = "N"
 
 
 class Quantity(Timed):
@@ -76,7 +78,7 @@ class Quantity(Timed):
         if m.kind == "reaction":
             return "N" if m.index[0] < 3 else "N m"
         if m.kind == "contact":
-            return "N"
+            return m.force
         return "" if m.kind == "multiplier" else _UNITS[m.kind][m.order]
 
     @property

@@ -16,7 +16,7 @@ from symdyn.runtime.building.compiler import find_compiler
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
-def walker_system(ahead: float = 0.1, law: str = "rigid") -> sd.System:
+def walker_system(ahead: float = 0.15, law: str = "rigid") -> sd.System:
     """The simplest walker (Garcia, Chatterjee, Ruina and Coleman 1998) with feet of mass m: a hip on two legs of length 1 whose
     feet touch the slope with much friction. A foot is ignored until it is `ahead` of the other one: in mid-swing it scuffs."""
     x, y, left, right = sd.coordinates("x y left right")

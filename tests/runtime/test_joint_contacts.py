@@ -6,6 +6,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ModelError
+from symdyn.model.contacts.lowering import with_contacts
 
 G = 9.81
 
@@ -214,3 +215,27 @@ def test_overlapping_stops_and_ropes_are_rejected_at_the_start() -> None:
     system.add_contact(sd.Stop("knee", "a", lower=0.5))
     with pytest.raises(sd.ArgumentError, match=r"knee_lower by 0.5 m or rad; start from q = \{q_a: 0.5\}"):
         system.compile().simulate((0, 1))
+
+
+def test_friction_of_a_joint_in_the_energy_balance_and_its_unit() -> None:
+    """It takes the sliding torque times the angle that was turned; the force along its row is a torque."""
+    q = sd.coordinates("q")
+    system = sd.System("brake")
+    rotor = system.add_body("rotor", mass=1.0, inertia=[0.5] * 3)
+    system.add_joint(sd.Revolute("hinge", system.ground, rotor, coordinate=q))
+    system.add_contact(sd.JointFriction("brake", "hinge", breakaway=2.0, sliding=1.5))
+    solution = system.compile().simulate((0, 3), u=[6.0], rtol=1e-12, work=True)
+    balance = solution.energy_balance
+    assert balance["friction of brake"][-1] == pytest.approx(-0.5 * 0.5 * 36, rel=1e-10)
+    assert np.abs(balance["friction of brake"] + 1.5 * solution["q"]).max() < 1e-9 and np.abs(balance["work"]).max() < 1e-9
+    (contact,) = with_contacts(system).rigid_contacts
+    assert contact.forces[0].unit == "N m"
+    assert with_contacts(roped()).rigid_contacts[0].forces[0].unit == "N"
+
+
+def roped() -> sd.System:
+    system = sd.System("roped")
+    ball = system.add_body("ball", mass=1.0)
+    system.add_joint(sd.Prismatic("along", system.ground, ball, axis=[1, 0, 0], coordinate=sd.coordinates("x")))
+    system.add_contact(sd.Rope("rope", ball, "ground", length=1.0))
+    return system

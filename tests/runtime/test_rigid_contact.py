@@ -77,7 +77,11 @@ def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:
     assert len(sliding) == 101
     assert np.abs(sliding - expected).max() < 1e-10
     assert np.abs(sticking[1:] - (expected[:100] + slips)).max() < 1e-10
-    assert np.abs(solution.energy_balance["error"]).max() < 1e-9
+    balance = solution.energy_balance
+    assert np.abs(balance["error"]).max() < 1e-9
+    slipped = 2 * (begins - centre) + speed * slips  # of the belt under the block in one period
+    sticks = np.searchsorted(solution.t, expected[100]) - 1  # the last time before it slips again
+    assert balance["friction of sole"][sticks] == pytest.approx(-100 * kinetic * G * slipped, rel=1e-9)
 
 
 def test_rocking_block_keeps_housners_times() -> None:
@@ -314,7 +318,8 @@ def test_tumbling_box_comes_to_rest_and_its_energy_balances(law: str) -> None:
     balance = solution.energy_balance
     assert {"impact of corner_1", "impact of corner_3"} <= set(balance)
     assert np.abs(balance["error"]).max() < 1e-8
-    assert all((np.diff(rows) <= 1e-12).all() for name, rows in balance.items() if name.startswith("impact"))
+    assert {"friction of corner_1", "friction of corner_3"} <= set(balance) and np.abs(balance["work"]).max() < 1e-8
+    assert all((np.diff(rows) <= 1e-10).all() for name, rows in balance.items() if name.startswith(("impact", "friction")))
     assert min(contact.gap.min() for contact in solution.contacts.values()) > -1e-9
 
 
@@ -409,6 +414,14 @@ def test_faults_of_contacts_are_reported_together() -> None:
     assert "touches a Plane, found a Sphere" in str(caught.value)
 
 
+def test_static_friction_without_a_number_is_not_compared() -> None:
+    system = ball(friction=(sd.parameters("mu_s"), 0.3))
+    system.check()
+    system.defaults[sd.parameters("mu_s")] = 0.2
+    with pytest.raises(ModelError, match=r"kinetic friction 0.3 is above static friction 0.2"):
+        system.check()
+
+
 def test_loads_that_depend_on_reactions_do_not_go_with_rigid_contacts() -> None:
     system = ball()
     system.add_force("ball", [0, sd.acceleration("ball")[1] / 10])
@@ -422,7 +435,7 @@ def test_what_contacts_do_not_go_with_is_rejected() -> None:
         module.simulate((0, 1), q=[-0.2])
     with pytest.raises(ArgumentError, match="do not run backward in time"):
         module.simulate((1, 0), q=[0.2])
-    for call in (module.equilibrium, module.equilibria, lambda: module.periodic(1.0)):
+    for call in (module.equilibrium, module.equilibria):
         with pytest.raises(ArgumentError, match="not known with the rigid contacts floor"):
             call()
     bound = ball().compile(specialize={"floor_closed": 0.0})

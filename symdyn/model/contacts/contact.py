@@ -98,8 +98,8 @@ class Contact:
             found += compliance_faults(self.where, self.compliance, number, self.kinetic)
         numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
         found += range_faults(self.where, numbers)
-        static, kinetic = (numbers.get(f"{kind} friction", 0.0) for kind in ("static", "kinetic"))
-        if kinetic > static >= 0:
+        static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))
+        if static is not None and kinetic is not None and kinetic > static >= 0:
             found.append(above(self.where, kinetic, static))
         return found
 

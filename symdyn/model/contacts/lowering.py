@@ -25,6 +25,7 @@ from symdyn.model.loads import Force, Torque
 from symdyn.model.quantity import Measure, Quantity
 from symdyn.model.state import State
 from symdyn.model.symbols import Coordinate
+from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -103,9 +104,9 @@ class CompliantContact:
         return [self.gap, self.slip_speed, *self.forces, *self.rows[1:]]
 
 
-def contact_force(name: str, row: int) -> Quantity:
-    """The force of a rigid contact along one of its rows, N."""
-    return Quantity(Measure("contact", (name,), index=(row,)))
+def contact_force(name: str, row: int, unit: str = "N") -> Quantity:
+    """The force of a rigid contact along one of its rows; of an element of joints it may be a torque, N m."""
+    return Quantity(Measure("contact", (name,), index=(row,), force=unit))
 
 
 def with_contacts(system: System) -> System:
@@ -180,7 +181,8 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
 
 def _add_row(system: System, element: JointElement, row: Row) -> None:
     """Loads, events and the row of an element of joints."""
-    name, force = row.name, contact_force(row.name, 0)
+    unit = force_unit(row.on[0][0].speed_units[0]) if row.on else "N"  # of a rope
+    name, force = row.name, contact_force(row.name, 0, unit)
     switch = sp.Symbol(f"{name}_{'sticking' if row.kind == FRICTION else 'closed'}", real=True)
     sliding: tuple[sp.Symbol, ...] = ()
     slide: tuple[sp.Expr, ...] = ()

@@ -26,7 +26,7 @@ from symdyn.runtime.integrating.outcome import Outcome, Stepped
 from symdyn.runtime.paths import as_path, writing
 from symdyn.runtime.solutions import frames
 from symdyn.runtime.solutions.contacts import ContactMotion, GroupMotion, contact_motions, group_motions
-from symdyn.runtime.solutions.energy_balance import reset_energy
+from symdyn.runtime.solutions.energy_balance import friction_energy, reset_energy
 from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
 from symdyn.runtime.solutions.sensitivity import Sensitivity
 from symdyn.shown import name_of, shown
@@ -283,9 +283,9 @@ class Solution:
     @property
     def energy_balance(self) -> dict[str, np.ndarray]:
         """Parts of the energy balance since the start, each (n_t,), J: "change" of kinetic and potential energy; "work" of the
-        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "impact of NAME" for every rigid contact,
-        by method="moreau" "contact NAME" with its friction;
-        "error", the change less all others.
+        loads, without that of dry friction of rigid contacts, which is "friction of NAME"; "reset of NAME" for every event that
+        reset the state, see `reset_energy`; "impact of NAME" for every rigid contact; by method="moreau" "contact NAME" with its
+        friction; "error", the change less all others.
 
         Raises ArgumentError as `work` does.
 
@@ -295,7 +295,8 @@ class Solution:
         """
         change = self.energy - self.energy[0]
         touching = {f"{contact.name}_closes" for contact in self.module.metadata.contacts}
-        parts = {"work": self.work}
+        friction = friction_energy(self)
+        parts = {"work": self.work - sum(friction.values()), **friction}
         for name, rows in self.reset_energy.items():
             parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
         if self._stepped is not None:
