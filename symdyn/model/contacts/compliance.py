@@ -57,6 +57,8 @@ class Compliance:
     viscous      s/m: friction that grows with the slip, by the normal force
     bristles     friction by bristles in place of the slip alone, see Bristles
     depth        m: runs that go deeper report it; None: no limit
+    located      whether steps end where the gap closes or opens, and where damping lets go, the kinks of the force: motions are
+                 more exact, and batches run one by one. The events are NAME_touches and NAME_releases
 
     >>> sd.contacts.Compliance(1e5).exponent
     3/2
@@ -70,6 +72,7 @@ class Compliance:
     viscous: Scalar = 0
     bristles: Bristles | None = None
     depth: float | None = None
+    located: bool = False
 
 
 def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scalar | None = None,
@@ -100,10 +103,12 @@ def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scal
 
 @dataclass(frozen=True)
 class Law:
-    """A compliant contact's forces along its rows, and the rates of its bristles."""
+    """A compliant contact's forces along its rows, the rates of its bristles, and what its normal force has kinks at besides the
+    gap."""
 
     forces: tuple[sp.Expr, ...]
     rates: tuple[sp.Expr, ...]
+    kinks: tuple[sp.Expr, ...] = ()
 
 
 def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Expr, rows: Sequence[sp.Expr],
@@ -116,9 +121,9 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
     elastic = number(compliance.stiffness, "stiffness") * depth ** number(compliance.exponent, "exponent")
     damped = 1 - number(compliance.dissipation, "dissipation") * rows[0]
     normal = elastic if damped == 1 else elastic * sp.Max(0, damped)
-    slips = rows[1:]
+    slips, kinks = rows[1:], () if damped == 1 else (damped,)
     if not slips:
-        return Law((normal,), ())
+        return Law((normal,), (), kinks)
     square = sp.Add(*[v**2 for v in slips])
     coefficient = kinetic
     if compliance.stribeck is not None:
@@ -126,7 +131,7 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
     viscous = number(compliance.viscous, "viscous")
     if compliance.bristles is None:
         speed = sp.sqrt(square + number(compliance.slip_speed, "slip_speed") ** 2)
-        return Law((normal, *[-normal * (coefficient / speed + viscous) * v for v in slips]), ())
+        return Law((normal, *[-normal * (coefficient / speed + viscous) * v for v in slips]), (), kinks)
     bristles = compliance.bristles
     stiffness, damping = number(bristles.stiffness, "stiffness of bristles"), number(bristles.damping, "damping of bristles")
     limit = coefficient / stiffness
@@ -142,14 +147,14 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
         rates = [v - plastic * outwards * z / (size * limit) for v, z in zip(slips, deflections, strict=True)]
     forces = [-normal * (stiffness * z + damping * rate + viscous * v)
               for z, rate, v in zip(deflections, rates, slips, strict=True)]
-    return Law((normal, *forces), tuple(rates))
+    return Law((normal, *forces), tuple(rates), kinks)
 
 
 def compliance_faults(where: str, given: Any, numbers: Any, kinetic: Any) -> list[str]:
     """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
-    found = []
+    found = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]
     checks: list[tuple[str, Any, float, bool]] = [
         ("stiffness", given.stiffness, 0.0, False), ("exponent", given.exponent, 1.0, True),
         ("dissipation", given.dissipation, 0.0, True), ("slip_speed", given.slip_speed, 0.0, False),

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
 
 CLOSES, OPENS, STICKS, SLIPS, TURNS, IGNORED, COUNTS = "closes", "opens", "sticks", "slips", "turns", "ignored", "counts"
+TOUCHES, RELEASES = "touches", "releases"  # of compliant contacts
 # A speed, m/s, with which the direction of friction is still known where a contact begins to slip.
 SLOW = sp.Rational(1, 10**12)
 # Added to the diagonal of the rows that hold, by their size, where they depend on each other.
@@ -212,6 +213,10 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
                                                       geometry.place(touch), _along(directions, law.forces)))
     _act(system, geometry, touch, directions, law.forces)
+    if compliance.located:
+        stays = next(q for joint in system.joints for q in joint.coordinates if isinstance(q, Coordinate))
+        for what, values in ((TOUCHES, (touch.gap,)), (RELEASES, law.kinks)):  # a reset ends the step, and changes nothing here
+            system.events += [Event(f"{touch.name}_{what}", value, 0, False, ((stays, stays),)) for value in values]
 
 
 def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],

@@ -297,7 +297,10 @@ class Solution:
         touching = {f"{contact.name}_closes" for contact in self.module.metadata.contacts}
         friction = friction_energy(self)
         parts = {"work": self.work - sum(friction.values()), **friction}
+        touched = {f"{contact.name}_{what}" for contact in self.module.metadata.compliant for what in ("touches", "releases")}
         for name, rows in self.reset_energy.items():
+            if touched.issuperset(name.split(" + ")):  # resets that change nothing
+                continue
             parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
         if self._stepped is not None:
             metadata = self.module.metadata
