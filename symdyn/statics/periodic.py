@@ -19,7 +19,7 @@ from symdyn.contact_kinds import CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium, SimulationWarning
 from symdyn.real_numbers import number_of, real_of
 from symdyn.runtime.contact_laws import OPEN, STICKING
-from symdyn.runtime.integrating.contacts import onto_rows, rows_of
+from symdyn.runtime.integrating.contacts import numbers, onto_rows, rows_of
 from symdyn.runtime.integrating.simulate import start_of
 from symdyn.runtime.integrating.stabilization import ProjectionFailed, Projector
 from symdyn.runtime.masses import real_parameters
@@ -216,7 +216,7 @@ class _Problem:
         given = () if self.inputs is None else self.inputs
         inputs = take(given, self.module.metadata.inputs, "inputs", self.module.metadata.initial, self.module.name)
         for _ in range(3):
-            x = onto_rows(self.module, self.t, x, self.p, inputs, gaps, held)
+            x = onto_rows(lambda state: numbers(self.module, self.t, state, self.p, inputs), x, gaps, held)
         return Projector(self.module, self.p)(self.t, x)
 
     def enough(self, x: np.ndarray, end: np.ndarray) -> float:

@@ -85,28 +85,27 @@ def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
     sizes, k = module.metadata.sizes, len(module.metadata.contacts)
     n = sum(record.rows for record in module.metadata.contacts)
     values = module.evaluate(CONTACTS, t, x[:sizes.x], p, inputs)
-    of_contacts, rest = values[:4 * k].reshape(k, 4).T, values[4 * k:]
-    parts = np.split(rest, np.cumsum([n, n, n, n * n, sizes.u * n]))
-    gap, static, kinetic, restitution = of_contacts
-    slip, free, force = parts[:3]
-    return Numbers(gap, static, kinetic, restitution, slip, free, force, parts[3].reshape(n, n), parts[4].reshape(-1, n),
-                   parts[5].reshape(-1, n))
+    gap, static, kinetic, restitution = values[:4 * k].reshape(k, 4).T
+    rest = values[4 * k:]
+    speeds, coordinates = 3 * n + n * n, 3 * n + n * n + sizes.u * n
+    return Numbers(gap, static, kinetic, restitution, rest[:n], rest[n:2 * n], rest[2 * n:3 * n],
+                   rest[3 * n:speeds].reshape(n, n), rest[speeds:coordinates].reshape(-1, n), rest[coordinates:].reshape(-1, n))
 
 
-def onto_rows(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any, gaps: Mapping[int, int],
-              held: Sequence[int]) -> np.ndarray:
+def onto_rows(of: Callable[[np.ndarray], Numbers], x: np.ndarray, gaps: Mapping[int, int], held: Sequence[int]) -> np.ndarray:
     """A state whose gaps are zero and whose velocities along rows are none, to first order, by the smallest change in the metric
     of the mass matrix.
 
+    of     the numbers at a state
     gaps   places of contacts with that of their normal row; held: places of rows
     """
-    n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
-    at, normal, x = numbers(module, t, x, p, inputs), list(gaps.values()), x.copy()
+    at, normal, x = of(x), list(gaps.values()), x.copy()
+    n_q, n_u = len(at.coordinates), len(at.speeds)
     if gaps:
         push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[list(gaps)], rcond=1e-10)[0]
         if np.abs(push).max(initial=0.0) > 0:
             x[:n_q] += at.coordinates[:, normal] @ push
-            at = numbers(module, t, x, p, inputs)
+            at = of(x)
     if held:
         stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
         x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
@@ -236,6 +235,7 @@ class _Phases:
         self.still = [False] * n  # whether the slip of a closed contact is zero
         self.passed = [False] * n  # whether an open contact is ignored
         self.size = 0.0  # of coordinates and gaps
+        self.latest_numbers: tuple[tuple[float, bytes, bytes], Numbers] | None = None  # and what they are of
         self.fresh = [False] * n  # whether it has just begun to slip
         self.shared = False
         begin, end = self.request.span
@@ -440,7 +440,7 @@ class _Phases:
         """The state that a switch makes of another one, and what the contacts that are hit do there."""
         other = copy.copy(self)
         other.request = replace(self.request, p=p, inputs=inputs)
-        other.impacts, other.happened, other.doubts = [], [], []
+        other.impacts, other.happened, other.doubts, other.latest_numbers = [], [], [], None
         x, decided = x.copy(), []
         for one in made:
             other.modes, other.still = list(one.modes), list(one.still)
@@ -454,7 +454,10 @@ class _Phases:
     def _numbers(self, t: float, x: np.ndarray) -> Numbers:
         request = self.request
         inputs = request.inputs.at(t, x[:request.n_state])
-        return numbers(self.module, t, x, request.p, inputs)  # in the open mode: what is taken is that of all modes
+        key = t, x[:request.n_state].tobytes(), np.asarray(inputs).tobytes()
+        if self.latest_numbers is None or self.latest_numbers[0] != key:  # in the open mode: what is taken is that of all modes
+            self.latest_numbers = key, numbers(self.module, t, x, request.p, inputs)
+        return self.latest_numbers[1]
 
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
@@ -541,8 +544,7 @@ class _Phases:
         gaps = {k: self.normal[k] for k in closed if k in self.placed}
         held = [self.normal[k] for k in closed if self.records[k].normal]
         held += [row for k in closed if self.still[k] for row in self.tangents[k]]
-        inputs = self.request.inputs.at(t, x[:self.request.n_state])
-        return onto_rows(self.module, t, x, self.request.p, inputs, gaps, held)
+        return onto_rows(partial(self._numbers, t), x, gaps, held)
 
     def _impact(self, t: float, x: np.ndarray, at: Numbers, touching: Sequence[int],
                 hit: Sequence[int]) -> tuple[np.ndarray, list[int]]:
@@ -670,6 +672,8 @@ class _Phases:
     def _zeno(self, t: float, at: Numbers, rebound: Sequence[int], hit: Sequence[int]) -> list[int]:
         """Contacts whose next flights are too short to be followed: they stay closed. The time at which the flights have come to
         their end is noted: for a ball it is the sum of a geometric series."""
+        if not rebound:
+            return []
         closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
         places = [row for k in closed for row in self.rows[k]]
         lam = np.zeros(len(at.free))
