@@ -414,6 +414,19 @@ def test_faults_of_contacts_are_reported_together() -> None:
     assert "touches a Plane, found a Sphere" in str(caught.value)
 
 
+@pytest.mark.parametrize(("values", "text"), [
+    ((-0.1, -0.1, 0.5), "static friction of contact floor is -0.1; pass a number that is not negative; kinetic friction"),
+    ((0.3, 0.2, 1.5), "restitution of contact floor is 1.5, which would gain energy in every impact"),
+    ((0.3, 0.2, -0.5), "restitution of contact floor is -0.5; pass a number that is not negative"),
+    ((0.2, 0.3, 0.5), "kinetic friction of contact floor is 0.3, above static friction 0.2; pass static friction")])
+def test_coefficients_that_parameters_make_impossible(values: tuple[float, float, float], text: str) -> None:
+    static, kinetic, e = sd.parameters("mu_s mu_k e")
+    system = ball(friction=(static, kinetic), restitution=e)
+    system.defaults.update({static: 0.3, kinetic: 0.2, e: 0.5})
+    with pytest.raises(ArgumentError, match=text):
+        system.compile(backend="numpy").simulate((0, 1), q=[1.0], params=dict(zip((static, kinetic, e), values, strict=True)))
+
+
 def test_static_friction_without_a_number_is_not_compared() -> None:
     system = ball(friction=(sd.parameters("mu_s"), 0.3))
     system.check()

@@ -92,6 +92,22 @@ def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
                    rest[3 * n:speeds].reshape(n, n), rest[speeds:coordinates].reshape(-1, n), rest[coordinates:].reshape(-1, n))
 
 
+def _check_coefficients(module: Module, at: Numbers) -> None:
+    """Raise ArgumentError for friction and restitution that cannot be, as `params` may give them."""
+    faults = []
+    for record, static, kinetic, e in zip(module.metadata.contacts, at.static, at.kinetic, at.restitution, strict=True):
+        faults += [f"{what} of contact {record.name} is {value:g}; pass a number that is not negative" for what, value in
+                   (("static friction", static), ("kinetic friction", kinetic), ("restitution", e)) if value < 0]
+        if e > 1:
+            faults.append(f"restitution of contact {record.name} is {e:g}, which would gain energy in every impact; pass a "
+                          "number from 0 to 1")
+        if kinetic > static >= 0:
+            faults.append(f"kinetic friction of contact {record.name} is {kinetic:g}, above static friction {static:g}; pass "
+                          "static friction that is not below it")
+    if faults:
+        raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
+
+
 def onto_rows(of: Callable[[np.ndarray], Numbers], x: np.ndarray, gaps: Mapping[int, int], held: Sequence[int]) -> np.ndarray:
     """A state whose gaps are zero and whose velocities along rows are none, to first order, by the smallest change in the metric
     of the mass matrix.
@@ -131,8 +147,10 @@ def check_counted(module: Module) -> None:
 
 
 def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
-    """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not."""
+    """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not, and for coefficients
+    that parameters make impossible."""
     at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
+    _check_coefficients(module, at)
     passed = ignored(module, t, x, p, inputs)
     counts = [record.kind != CLUTCH and not other for record, other in zip(records, passed, strict=True)]
     deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and counts[k]]
