@@ -107,12 +107,14 @@ class _Search:
     def __init__(self, tree: Tree, solid: bool) -> None:
         self.tree, self.solid = tree, solid
         self.moving: list[frozenset[int]] = []
+        self.own: list[list[frozenset[int]]] = []  # of each link, of each of its joint's speeds
         for link in tree.links:
             before = self.moving[link.parent] if link.parent >= 0 else frozenset()
-            self.moving.append(before.union(*[places(row) for row in tree.D[link.speeds]]))
+            self.own.append([places(row) for row in tree.D[link.speeds]])
+            self.moving.append(before.union(*self.own[-1]))
         bending = [places(tree.D[place]) for body in tree.flexible for place in body.speeds]
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
-        self.positions = [_Position(tree, k, solid) for k in range(POSITIONS)]
+        self.positions = [_Position(tree, k, solid, self.own) for k in range(POSITIONS)]
 
     def lockable(self) -> dict[int, frozenset[int]]:
         sound: set[int] = set()
@@ -142,7 +144,7 @@ class _Search:
         """Whether speed p always moves link k otherwise than the speeds after it do; None where it never does."""
         tree, link = self.tree, self.tree.links[k]
         alone = not after and (link.parent < 0 or p not in self.moving[link.parent])
-        along = [any(not is_zero(e) and p in places(row) for e, row in zip(entries, tree.D[link.speeds], strict=True))
+        along = [any(not is_zero(e) and p in own for e, own in zip(entries, self.own[k], strict=True))
                  for entries in link.S]
         if alone and felt(tree, k, np.array(along, dtype=int)):
             return True
@@ -155,8 +157,8 @@ class _Search:
 class _Position:
     """A tree at random values of everything that it depends on; links are evaluated when they are first asked for."""
 
-    def __init__(self, tree: Tree, seed: int, solid: bool) -> None:
-        self.tree, self.solid = tree, solid
+    def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = ()) -> None:
+        self.tree, self.solid, self.own = tree, solid, own
         self.stream = random.Random(seed)
         self.values = dict.fromkeys(_idle(tree), 0.0)
         for joint in tree.model.joints:
@@ -181,7 +183,7 @@ class _Position:
         """Velocity of link k, at its origin, link axes, (6,), by each speed that moves it."""
         if k not in self._twists:
             link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
-            own = sorted(frozenset().union(*map(places, D)))
+            own = sorted(frozenset().union(*self.own[k]))
             R, r, S, D = map(_floats, self.numbers(link.R, link.r, link.S, D[:, own]))
             found = dict(zip(own, (S @ D).T, strict=True))
             before = self.twists(link.parent) if link.parent >= 0 else {}

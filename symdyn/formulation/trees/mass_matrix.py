@@ -104,11 +104,13 @@ class Factors:
     """M = L^T D L with L unit lower triangular, D diagonal; entries that are zero by structure are the number 0.
 
     A pivot that is zero by structure has the inverse 0: what is divided by it must not be used.
+    filled   of each row of L, the columns below the diagonal that are not zero by structure
     """
 
     L: np.ndarray
     D: list[Any]
     inverse_D: list[Any]
+    filled: list[list[int]]
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x with M x = right, (n,)."""
@@ -118,7 +120,7 @@ class Factors:
         """y with L^T y = right, (n,)."""
         y = np.array(right, dtype=object)
         for k in reversed(range(len(y))):
-            for i in range(k):
+            for i in self.filled[k]:
                 y[i] = y[i] - self.L[k, i] * y[k]
         return y
 
@@ -127,7 +129,7 @@ class Factors:
         x = np.array(y, dtype=object)
         for k in range(len(x)):
             x[k] = x[k] * self.inverse_D[k]
-            for i in range(k):
+            for i in self.filled[k]:
                 x[k] = x[k] - self.L[k, i] * x[i]
         return x
 
@@ -146,16 +148,18 @@ def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str], letters: str 
     A = np.array(M, dtype=object)
     L = zeros(n, n)
     inverse: list[Any] = [0] * n
+    filled: list[list[int]] = [[] for _ in range(n)]
     for k in reversed(range(n)):
+        filled[k] = columns = [i for i, e in enumerate(A[k, :k]) if not is_zero(e)]
         pivot = algebra.name(f"{letters}D{k + 1}", A[k, k])
         size = sizes.get(k, M[k, k])
         if k in least and not isinstance(pivot, (int, Fraction)) and pivot is not size:
             pivot = algebra.divisor(pivot, least[k] * size, reasons[k])
         pivot = algebra.positive(pivot, reasons[k])
         inverse[k] = 0 if is_zero(pivot) else algebra.name(f"i{letters}D{k + 1}", 1 / pivot)
-        for i in range(k):
+        for i in columns:
             L[k, i] = algebra.name(f"{letters}L{k + 1}_{i + 1}", A[k, i] * inverse[k])
-        for i in range(k):
-            for j in range(i + 1):
+        for place, i in enumerate(columns):
+            for j in columns[:place + 1]:
                 A[i, j] = A[i, j] - L[k, i] * A[k, j]
-    return Factors(L, list(np.diagonal(A)), inverse)
+    return Factors(L, list(np.diagonal(A)), inverse, filled)
