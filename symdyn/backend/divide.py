@@ -16,9 +16,14 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
     """Stretches of `body`, each with the nodes that later ones or the entries need; the place of each such node; their number.
 
     A stretch ends with a section where it can, and has at most `longest` steps. A place is used again once the last stretch
-    that reads it is over.
+    that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
+    others, `longest` by each.
     """
     stretches = _stretches(_products_beside_their_sums(body, entries), longest)
+    begin = len(stretches) - 1
+    if len(entries) > longest:
+        begin += 1
+        stretches += [[] for _ in range(0, len(entries), longest)]
     where = {node: k for k, stretch in enumerate(stretches) for node in stretch}
     last_use: dict[Node, int] = {}
     for k, stretch in enumerate(stretches):
@@ -27,10 +32,10 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
                 core = unsigned(a)
                 if where.get(core, k) != k:
                     last_use[core] = k
-    for e in entries:
-        core = unsigned(e)
-        if where.get(core, len(stretches) - 1) != len(stretches) - 1:
-            last_use[core] = len(stretches) - 1
+    for place, e in enumerate(entries):
+        core, reader = unsigned(e), begin + place // longest
+        if where.get(core, reader) != reader:
+            last_use[core] = reader
     over: dict[int, list[Node]] = {}
     for node, k in last_use.items():
         over.setdefault(k, []).append(node)

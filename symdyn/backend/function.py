@@ -23,13 +23,15 @@ class Part:
     """A stretch of a long function, a function of its own: compilers take more than linear time for one function.
 
     arguments   groups it reads, of t q u z ud inputs p c, in this order; it also gets w, which holds what parts hand on
-    results     statements that keep values in w; of the last part, those that store the function's result
+    results     statements that keep values in w, or those that store the function's result
+    stores      whether they store the result: the last part does, and of a long result as many parts as it takes
     """
 
     arguments: tuple[str, ...]
     loads: tuple[str, ...]
     sections: tuple[Section, ...]
     results: tuple[str, ...]
+    stores: bool = True
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ class Function:
     values: Function | None = None
     along: tuple[Along, ...] = ()
     motion: Motion | None = None
+
+    @property
+    def stores(self) -> bool:
+        """Whether it stores the result, as its last part does."""
+        return True
 
     @property
     def size(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from symdyn.backend.columns import Columns, MotionColumns, seeds_of
@@ -167,13 +167,17 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     parts: list[Part] = []
     earlier: dict[Node, tuple[str, int]] = {}
     found: set[Node] = set()
-    stretches, slots, n_w = divide(body, output.entries, dialect.parts.longest)
-    for k, (stretch, kept) in enumerate(stretches):
+    longest = dialect.parts.longest
+    stretches, slots, n_w = divide(body, output.entries, longest)
+    storing = max(1, -(-len(output.entries) // longest))
+    for k, (stretch, kept) in enumerate(stretches, storing - len(stretches)):
         writer = Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
-        if k == len(stretches) - 1:
-            parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries), checks))
+        if k < 0:
+            parts.append(replace(writer.part(stretch, kept, partial(writer.keep, kept, slots), checks), stores=False))
         else:
-            parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots), checks))
+            ends = range(len(output.entries)) if storing == 1 else range(k * longest, min((k + 1) * longest, len(output.entries)))
+            here = [output.entries[i] for i in ends]
+            parts.append(writer.part(stretch, here, writer.results_of(output.entries, ends), checks))
         earlier |= {node: ("w", slots[node]) for node in kept}
         found |= writer.printer.inline
     groups = {g for part in parts for g in part.arguments}

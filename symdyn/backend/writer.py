@@ -74,12 +74,13 @@ class Writer:
         written = results()
         return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), written)
 
-    def results_of(self, entries: Sequence[Any]) -> Callable[[], tuple[str, ...]]:
-        """What stores the entries as result, once their text is known."""
+    def results_of(self, entries: Sequence[Any], stored: Sequence[int] | None = None) -> Callable[[], tuple[str, ...]]:
+        """What stores the entries as result, once their text is known; stored: the indices of those that this part stores."""
         zeros = self.dialect.zeros if sum(map(is_zero, entries)) >= _MANY_ZEROS else None
-        begin = (zeros.format(n=len(entries)),) if zeros is not None else ()
-        return lambda: (*begin, *(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
-                                  for k, e in enumerate(entries) if not (begin and is_zero(e))))
+        indices = range(len(entries)) if stored is None else stored
+        begin = (zeros.format(n=len(entries)),) if zeros is not None and not (indices and indices[0]) else ()
+        return lambda: (*begin, *(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(entries[k]))
+                                  for k in indices if zeros is None or not is_zero(entries[k])))
 
     def keep(self, nodes: Sequence[Node], slots: Mapping[Node, int]) -> tuple[str, ...]:
         """What keeps values for later parts."""

@@ -37,6 +37,17 @@ def divided(monkeypatch: pytest.MonkeyPatch) -> Any:
     return set_parts
 
 
+def test_a_long_result_is_stored_by_several_parts(divided: Any) -> None:
+    """No part stores more than parts are long; all entries are stored once, zeros included."""
+    divided(20)
+    equations = sd.systems.get("spatial_chain", n=6).recursive()
+    function = emit(equations, "c", ("mass_matrix",), standalone=False).program.functions[0]
+    stored = [[int(k) for line in part.results for k in re.findall(r"^out\[(\d+)\] =", line)] for part in function.parts]
+    assert [k for part in stored for k in part] == list(range(6 * 6))
+    assert max(map(len, stored)) <= 20
+    assert [part.stores for part in function.parts] == [bool(part) for part in stored]
+
+
 @needs_c
 @pytest.mark.parametrize("longest", [20, 100])
 @pytest.mark.parametrize(("name", "options"), [("spatial_chain", {"n": 4}), ("puma560", {}), ("n_link_pendulum", {"n": 6})])
