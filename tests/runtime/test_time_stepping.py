@@ -253,13 +253,13 @@ def test_what_does_not_fit_is_rejected() -> None:
         solution(0.123)
 
 
-def test_other_laws_and_elements_of_joints_are_rejected() -> None:
+def test_other_laws_and_friction_of_joints_are_rejected() -> None:
     """Their rows mean something else: impulses by Newton's law alone would be wrong without a word."""
     system = sd.System("door")
     leaf = system.add_body("leaf", mass=1.0, inertia=[1, 1, 1])
     hinge = system.add_joint(sd.Revolute("hinge", system.ground, leaf, sd.coordinates("q")))
-    system.add_contact(sd.Stop("frame", hinge, lower=0))
-    with pytest.raises(ArgumentError, match=r"takes contacts of bodies, not stops, clutches, .* \(frame\); leave out the method"):
+    system.add_contact(sd.JointFriction("rust", hinge, breakaway=2.0, sliding=1.0))
+    with pytest.raises(ArgumentError, match=r"not clutches or dry friction of joints \(rust\); leave out the method"):
         system.compile().simulate((0, 1), q=[1.0], method="moreau", step=1e-3)
     other = sd.System("ball", gravity=[0, -G])
     body = other.add_body("body", mass=1.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from symdyn.backend.c_records import codes_of
 from symdyn.backend.right_side import RightSide
-from symdyn.contact_kinds import BODIES
+from symdyn.contact_kinds import CLUTCH, FRICTION
 from symdyn.errors import ArgumentError
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import require_compiler
@@ -63,10 +63,11 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
     if not metadata.contacts and not metadata.contact_groups:
         raise ArgumentError(f"{name}: method='moreau' is for rigid contacts, of which there are none; pass another method, or "
                             "add_contact")
-    elements = [c.contact for c in metadata.contacts if c.kind != BODIES]
+    elements = [c.contact for c in metadata.contacts if c.kind in (CLUTCH, FRICTION)]
     if elements:
-        raise ArgumentError(f"{name}: method='moreau' takes contacts of bodies, not stops, clutches, ropes or dry friction of "
-                            f"joints ({', '.join(dict.fromkeys(elements))}); leave out the method, and switches are located")
+        raise ArgumentError(f"{name}: method='moreau' takes what has a gap that closes: contacts of bodies, stops, backlash and "
+                            f"ropes, not clutches or dry friction of joints ({', '.join(dict.fromkeys(elements))}); leave out "
+                            "the method, and switches are located")
     others = {c.contact: c.impact for c in metadata.contacts if c.impact != "newton"}
     if others:
         raise ArgumentError(f"{name}: method='moreau' has Newton's law of impacts; "
