@@ -48,10 +48,10 @@ _HOME = {
     "symdyn.optimal": ("Optimum", "Tracking", "optimize"),
     "symdyn.runtime.inputs.tables": ("Table",),
     "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",
-                      "EnsembleStopped", "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock",
-                      "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium", "NoOptimum", "NotARotation",
-                      "NotNormalized", "OptimumWarning", "RotationError", "SimulationInterrupted", "SimulationWarning",
-                      "SymdynError", "UnknownCase", "UnsupportedExpression", "ZeroAxis"),
+                      "CompilerWarning", "EnsembleStopped", "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning",
+                      "GimbalLock", "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium", "NoOptimum",
+                      "NotARotation", "NotNormalized", "OptimumWarning", "RotationError", "SimulationInterrupted",
+                      "SimulationWarning", "SymdynError", "UnknownCase", "UnsupportedExpression", "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {

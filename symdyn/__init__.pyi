@@ -38,6 +38,9 @@ from symdyn.errors import (
     CompilerNotFound as CompilerNotFound,
 )
 from symdyn.errors import (
+    CompilerWarning as CompilerWarning,
+)
+from symdyn.errors import (
     EnsembleStopped as EnsembleStopped,
 )
 from symdyn.errors import (

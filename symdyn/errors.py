@@ -44,6 +44,10 @@ class CompilerNotFound(SymdynError):
     """There is no usable C compiler, or not the one that was asked for."""
 
 
+class CompilerWarning(UserWarning):
+    """What was written has no binary, because there is no C compiler; the message says what can be done with it."""
+
+
 class ModelWarning(UserWarning):
     """A description that can be computed with but that no real mechanism has."""
 

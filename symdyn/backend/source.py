@@ -115,7 +115,7 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
            integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
-           only: str | None = None) -> Source:
+           only: Sequence[str] = ()) -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -124,7 +124,8 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
     states       how many random states the reference vectors begin with
-    only         the template of the one file that is wanted
+    only         the templates of the files that are wanted, without reference vectors; none: all, or the first one where they are
+                 not standalone
     Raises SymdynError for an unknown backend or a broken template.
     """
     folders = template_folders(templates)
@@ -147,15 +148,15 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         lanes = batch_of(shipped.parent, dialect, program, content.tapes, content.titles, places, content.otherwise)
     integrator = integrator and "rhs" in content.tapes
-    context = _context(content, program, dialect, standalone, integrator, lanes, method, states)
+    context = _context(content, program, dialect, standalone, integrator, lanes, method, 0 if only else states)
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
     context |= _runtime(environment, backend, content, context, method_of(method), gathered)
     files = {}
     wanted = dialect.files or {}
-    if not standalone:
-        wanted = {only: wanted[only]} if only is not None else dict(list(wanted.items())[:1])
+    if only or not standalone:
+        wanted = {template: wanted[template] for template in only or list(wanted)[:1]}
     for template, target in wanted.items():
         try:
             text = environment.get_template(f"{backend}/{template}").render(context)
@@ -232,7 +233,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
     written = [way for f in program.functions for way in _ways(f)]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
-    reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if standalone else None
+    wanted = standalone and states > 0
+    reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if wanted else None
     uses = {f.name: f.arguments for f in program.functions}
 
     def signature(f: Function) -> str:

@@ -14,14 +14,18 @@ LIBRARIES = {"casadi": "casadi.Function objects: NAME_casadi.py", "jax": "functi
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a file for every library that was asked for."""
+    """Write a file for every library that was asked for, an FMU."""
     wanted = [target for target in LIBRARIES if getattr(arguments, target)]
-    if not wanted:
-        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in LIBRARIES)}", WRONG)
+    if not wanted and not arguments.fmu:
+        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*LIBRARIES, 'fmu'))}", WRONG)
     from symdyn.pipeline import write_source
     from symdyn.targets.text import source_for
 
     equations = find_equations(arguments)
+    if arguments.fmu:
+        module = equations.compile(backend="numpy")
+        path = (arguments.output or Path("generated") / module.name) / f"{module.name}.fmu"
+        print(f"wrote {module.to_fmu(path, arguments.fmi, arguments.kind)}")
     for target in wanted:
         source = source_for(equations, target, arguments.functions)
         for path in write_source(source, arguments.output or Path("generated") / source.metadata.name):
@@ -33,4 +37,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
     for target, text in LIBRARIES.items():
         parser.add_argument(f"--{target}", action="store_true", help=f"{text}; it needs symdyn no more")
+    parser.add_argument("--fmu", action="store_true", help="an FMU for programs that import FMI, with its sources: NAME.fmu")
+    parser.add_argument("--fmi", type=int, choices=(3, 2), default=3, help="version of FMI (default: 3)")
+    parser.add_argument("--kind", choices=("co_simulation", "model_exchange"), default="co_simulation",
+                        help="of the FMU: with the integrator inside, or for the importer's (default: co_simulation)")
     parser.add_argument("--functions", metavar="NAME", nargs="+", help="what to write (default: rhs, mass_matrix, ...)")

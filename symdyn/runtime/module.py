@@ -1016,6 +1016,31 @@ class Module:
         with writing(target):
             return self._writer(target)
 
+    def to_fmu(self, path: PathName, version: int = 3, kind: str = "co_simulation", *, q: Values | None = None,
+               u: Values | None = None, z: Values | None = None, params: Values | None = None,
+               inputs: Values | None = None) -> Path:
+        """Write an FMU, for programs that import the Functional Mock-up Interface; returns its path.
+
+        version   of the interface, 3 or 2
+        kind      "co_simulation", with the compiled integrator inside, or "model_exchange", for the importer's integrator
+        q, u, z, params, inputs   values at the start, in order, or by name or symbol; what is left out takes the system's
+
+        Variables are the states x, which are outputs, their derivatives der(...), inputs, tunable parameters, outputs, energies
+        and event indicators, with units. Directional derivatives are exact. The sources are inside, and a binary for this
+        platform; a CompilerWarning says where there is none, because there is no compiler.
+        Raises ArgumentError for inputs that are functions, for rigid contacts (their modes are found in Python), for parameters
+        without a value, and for a start off the constraints; CompileError.
+        Source: Modelica Association, Functional Mock-up Interface Specification 3.0, and version 2.0.4.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.to_fmu(tempfile.mkdtemp() + "/pendulum.fmu").name
+        'pendulum.fmu'
+        """
+        from symdyn.targets.fmu import write_fmu
+
+        return write_fmu(self, path, version, kind, q=q, u=u, z=z, params=params, inputs=inputs)
+
     def split_outputs(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """The user's outputs by name from the rows of the function `outputs`."""
         result, start = {}, 0

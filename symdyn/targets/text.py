@@ -35,12 +35,12 @@ def source_for(equations: Equations, target: str, names: Sequence[str] | None = 
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     functions = groups.written(equations, names, None)
     with collector_paused():
-        derivatives = [f"{name}_by_{by}" for name in functions for by in BY if _differentiable(equations, name, by)]
+        derivatives = [f"{name}_by_{by}" for name in functions for by in BY if differentiable(equations, name, by)]
         content = content_of(equations, [*functions, *derivatives], False, bound, RightSide(), all_columns_of)
-        return render(content, DIALECT, standalone=False, integrator=False, only=TARGETS[target])
+        return render(content, DIALECT, standalone=False, integrator=False, only=(TARGETS[target],))
 
 
-def _differentiable(equations: Equations, name: str, by: str) -> bool:
+def differentiable(equations: Equations, name: str, by: str) -> bool:
     """Whether the derivatives of a function by a group of arguments are emitted with it: not where a function of the user has
     none."""
     whole = f"{name}_by_{by}"

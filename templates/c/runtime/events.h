@@ -637,6 +637,14 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *kno
     run->events.kept = !reset;
 }
 
+// The state after the events that have fired, where a run has just been started, for callers that look for events on their own:
+// the same resets, kept on the constraints. after: SYMDYN_NX. Returns 0 or a failure.
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, double *after) {
+    symdyn_run *const run = memory;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.fired[k] = fired[k];
+    return symdyn_event_reset(run, run->t, run->x, after);
+}
+
 // Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
 // too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
 // on. Returns how many.

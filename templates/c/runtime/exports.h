@@ -14,5 +14,6 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
 #if SYMDYN_EVENTS
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing);
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *known, int reset);
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, double *after);
 SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows);
 #endif
