@@ -81,8 +81,8 @@ FMI2_EXPORT fmi2Component FMI2_NAME(fmi2Instantiate)(fmi2String name, fmi2Type t
 
 FMI2_EXPORT void FMI2_NAME(fmi2FreeInstance)(fmi2Component component) { fmu_free(component); }
 
-FMI2(fmi2SetupExperiment)(fmi2Component component, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
-    fmi2Boolean has_stop, fmi2Real stop) {
+FMI2(fmi2SetupExperiment)(
+    fmi2Component component, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
     const int code = fmu_begin(component, has_tolerance, tolerance, start, has_stop, stop);
     ((fmu_instance *)component)->s.mode = FMU_INSTANTIATED;
     return status_of(code);
@@ -243,8 +243,8 @@ FMI2(fmi2GetNominalsOfContinuousStates)(fmi2Component component, fmi2Real nomina
     return fmi2OK;
 }
 
-FMI2(fmi2SetRealInputDerivatives)(fmi2Component component, const fmi2ValueReference which[], size_t n,
-    const fmi2Integer orders[], const fmi2Real values[]) {
+FMI2(fmi2SetRealInputDerivatives)(
+    fmi2Component component, const fmi2ValueReference which[], size_t n, const fmi2Integer orders[], const fmi2Real values[]) {
     (void)which, (void)n, (void)orders, (void)values;
     return unsupported(component, "derivatives of inputs by time");
 }

@@ -60,8 +60,8 @@ FMI3(fmi3SetDebugLogging)(fmi3Instance instance, fmi3Boolean on, size_t n, const
     return fmi3OK;  // what is logged are errors and warnings
 }
 
-static fmi3Instance instantiated(fmi3String name, fmi3String token, fmi3InstanceEnvironment environment,
-    fmi3LogMessageCallback *log, int model_exchange) {
+static fmi3Instance instantiated(
+    fmi3String name, fmi3String token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback *log, int model_exchange) {
     fmu_instance *const f = model_exchange == FMU_MODEL_EXCHANGE ? fmu_new(name, token) : NULL;
     if (!f) {
         if (log) log(environment, fmi3Error, "logStatusError", "no instance: the token or the kind is that of another FMU");
@@ -159,8 +159,8 @@ FMI3_OTHER(UInt64, uint64_t)
 FMI3_OTHER(Boolean, fmi3Boolean)
 FMI3_OTHER(String, fmi3String)
 
-FMI3(fmi3GetBinary)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, size_t sizes[], fmi3Binary values[],
-    size_t n_values) {
+FMI3(fmi3GetBinary)(
+    fmi3Instance instance, const fmi3ValueReference which[], size_t n, size_t sizes[], fmi3Binary values[], size_t n_values) {
     (void)which, (void)sizes, (void)values, (void)n_values;
     return n ? unsupported(instance, "a variable of the type Binary") : fmi3OK;
 }
@@ -285,8 +285,8 @@ FMI3(fmi3SetIntervalDecimal)(fmi3Instance instance, const fmi3ValueReference whi
     return unsupported(instance, "a clock");
 }
 
-FMI3(fmi3SetIntervalFraction)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[],
-    const uint64_t resolutions[]) {
+FMI3(fmi3SetIntervalFraction)(
+    fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[], const uint64_t resolutions[]) {
     (void)which, (void)n, (void)counters, (void)resolutions;
     return unsupported(instance, "a clock");
 }
@@ -296,8 +296,8 @@ FMI3(fmi3SetShiftDecimal)(fmi3Instance instance, const fmi3ValueReference which[
     return unsupported(instance, "a clock");
 }
 
-FMI3(fmi3SetShiftFraction)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[],
-    const uint64_t resolutions[]) {
+FMI3(fmi3SetShiftFraction)(
+    fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[], const uint64_t resolutions[]) {
     (void)which, (void)n, (void)counters, (void)resolutions;
     return unsupported(instance, "a clock");
 }

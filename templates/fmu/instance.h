@@ -178,10 +178,10 @@ static void fmu_take_motions(fmu_state *s, double t, double end) {
 
 // Why the integrator stopped.
 static int fmu_run_failed(fmu_instance *f, int status) {
-    static const char *const reasons[] = {"", "the right-hand side cannot be evaluated", "the step became too small for the tolerance",
-        "a state is not finite", "a time, state or tolerance makes no sense", "the time lies before the latest step",
-        "there is no way back onto the constraints", "a quantity of an event is not finite",
-        "events follow each other with hardly any time between", "there is no series",
+    static const char *const reasons[] = {"", "the right-hand side cannot be evaluated",
+        "the step became too small for the tolerance", "a state is not finite", "a time, state or tolerance makes no sense",
+        "the time lies before the latest step", "there is no way back onto the constraints",
+        "a quantity of an event is not finite", "events follow each other with hardly any time between", "there is no series",
         "the constraints do not allow what a reset makes of a state"};
     symdyn_report report;
     double states[2 * FMU_N_X];

@@ -7,7 +7,7 @@
 #include "status.h"
 
 typedef struct {
-    symdyn_problem problem;   // first: whoever copies the memory of a run puts a problem of its own there
+    symdyn_problem problem;
     double t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
     double t_end, direction;  // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
     double t_slack, h_floor;  // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
