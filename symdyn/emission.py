@@ -66,6 +66,7 @@ def write_source(source: Source, folder: Path) -> list[Path]:
     paths = []
     for name, text in source.files.items():
         path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, partial(_put, text.encode()), sync=False)
         paths.append(path)
     return paths

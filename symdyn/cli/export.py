@@ -14,10 +14,10 @@ LIBRARIES = {"casadi": "casadi.Function objects: NAME_casadi.py", "jax": "functi
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a file for every library that was asked for, an FMU."""
+    """Write a file for every library that was asked for, an FMU, a CMake package."""
     wanted = [target for target in LIBRARIES if getattr(arguments, target)]
-    if not wanted and not arguments.fmu:
-        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*LIBRARIES, 'fmu'))}", WRONG)
+    if not wanted and not arguments.fmu and not arguments.cmake:
+        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*LIBRARIES, 'fmu', 'cmake'))}", WRONG)
     from symdyn.pipeline import write_source
     from symdyn.targets.text import source_for
 
@@ -26,6 +26,9 @@ def export(arguments: argparse.Namespace) -> int:
         module = equations.compile(backend="numpy")
         path = (arguments.output or Path("generated") / module.name) / f"{module.name}.fmu"
         print(f"wrote {module.to_fmu(path, arguments.fmi, arguments.kind)}")
+    if arguments.cmake:
+        for path in equations.to_cmake(arguments.output or Path("generated") / equations.name, arguments.jacobians):
+            print(f"wrote {path}")
     for target in wanted:
         source = source_for(equations, target, arguments.functions)
         for path in write_source(source, arguments.output or Path("generated") / source.metadata.name):
@@ -41,4 +44,6 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fmi", type=int, choices=(3, 2), default=3, help="version of FMI (default: 3)")
     parser.add_argument("--kind", choices=("co_simulation", "model_exchange"), default="co_simulation",
                         help="of the FMU: with the integrator inside, or for the importer's (default: co_simulation)")
+    parser.add_argument("--cmake", action="store_true", help="a CMake package for firmware and C++17, float or double")
+    parser.add_argument("--jacobians", action="store_true", help="exact derivatives in the CMake package, too")
     parser.add_argument("--functions", metavar="NAME", nargs="+", help="what to write (default: rhs, mass_matrix, ...)")

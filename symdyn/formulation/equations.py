@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from symdyn.analytic.units import UnitReport
     from symdyn.exact.mechanism import Proofs
     from symdyn.formulation.identification.quantities import BaseParameters
-    from symdyn.given import Numbers
+    from symdyn.given import Numbers, PathName
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
     from symdyn.sympy_mechanics.back import SympyEquations
@@ -455,6 +455,26 @@ class Equations:
         from symdyn.targets.jax_function import jax_function
 
         return jax_function(self, name, dtype, through, unroll, specialize)
+
+    def to_cmake(self, folder: PathName, jacobian: bool = False, specialize: Numbers | None = None) -> list[Path]:
+        """Write a CMake package for firmware and C++ into a folder; returns the paths of its files.
+
+        jacobian     whether it has the exact derivatives of the right-hand side, jacobian_x and jacobian_inputs
+        specialize   parameters, by symbol or name, that become numbers
+
+        The package has C99 sources, a header for C++17 with spans of fixed sizes, a self-test, and a README.md with the stack
+        that functions take. Numbers are double or, by the option NAME_REAL of CMake, float; nothing is allocated, nothing is
+        global; steps have a fixed length and always the same work.
+        Raises ArgumentError for events and rigid contacts, which such steps do not look for.
+
+        >>> import tempfile
+        >>> paths = sd.systems.pendulum().embedding().to_cmake(tempfile.mkdtemp())
+        >>> sorted(path.name for path in paths)[:3]
+        ['CMakeLists.txt', 'README.md', 'clock.h']
+        """
+        from symdyn.targets.cmake import write_cmake
+
+        return write_cmake(self, folder, jacobian, specialize)
 
     def to_torch(self, name: str = "rhs", dtype: str = "float64",
                  specialize: Numbers | None = None) -> Callable[..., torch.Tensor]:
