@@ -44,11 +44,12 @@ def tools() -> str:
     return ", ".join(tool for tool in (GCC, QEMU, "arm-none-eabi-size") if shutil.which(tool) is None)
 
 
-def on_target(folder: Path, name: str, real: str) -> OnTarget:
+def on_target(folder: Path, real: str) -> OnTarget:
     """Compile the package in a folder for a Cortex-M4 with numbers that are "float" or "double", and run its self-test there.
 
     Raises subprocess.CalledProcessError where it does not compile, subprocess.TimeoutExpired where it does not end.
     """
+    name = next((folder / "src").glob("*.c")).stem
     defined = [f"-D{name.upper()}_FLOAT"] if real == "float" else []
     options = [*PROCESSOR, "-std=c99", "-O2", "-ffp-contract=off", *defined, "-I", str(folder / "include")]
     with tempfile.TemporaryDirectory() as scratch:
@@ -83,7 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
         with tempfile.TemporaryDirectory() as folder:
             sd.systems.get(name).equations().to_cmake(folder)
             for real in ("float", "double"):
-                r = on_target(Path(folder), name, real)
+                r = on_target(Path(folder), real)
                 print(f"| `{name}` | {real} | {r.rhs:,} | {r.step:,} | {r.code_bytes:,} | {r.stack_bytes:,} | {r.compared} | "
                       f"{r.wrong} |", flush=True)
 

@@ -128,7 +128,7 @@ def test_a_wrong_size_does_not_compile(package, tmp_path):
 @pytest.mark.parametrize("real", ["float", "double"])
 @pytest.mark.parametrize("name", ["two_link_arm", "four_bar"])
 def test_the_self_test_passes_on_a_cortex_m(package, loop, name, real):
-    result = on_target(package if name == "two_link_arm" else loop, name, real)
+    result = on_target(package if name == "two_link_arm" else loop, real)
     assert result.wrong == 0 and result.compared >= 8, result.output
     assert 0 < result.rhs < result.step < 400_000
     assert 0 < result.stack_bytes < 16_384 and 0 < result.code_bytes < 100_000
@@ -138,7 +138,7 @@ def test_the_self_test_passes_on_a_cortex_m(package, loop, name, real):
 def test_steps_on_a_cortex_m_keep_the_constraints_and_the_motion(loop):
     """200 steps of 1 ms in double on the processor, compared with simulate."""
     module = sd.systems.four_bar().compile(backend="c")
-    output = on_target(loop, "four_bar", "double").output
+    output = on_target(loop, "double").output
     x = np.array(re.search(r"steps of 1 ms: (.*)", output)[1].split(), dtype=float)
     wanted = module.simulate((0, 0.2), rtol=1e-12).x[-1]
     assert np.abs(x - wanted).max() < 1e-8
@@ -174,3 +174,11 @@ def test_events_are_rejected(tmp_path):
 def test_a_path_that_is_none_is_rejected():
     with pytest.raises(sd.ArgumentError, match="the path of the CMake package"):
         sd.systems.pendulum().embedding().to_cmake(3)
+
+
+def test_the_command_writes_a_package(tmp_path, capsys):
+    from symdyn.cli import main
+
+    assert main(["export", "pendulum", "--cmake", "--jacobians", "--output", str(tmp_path)]) == 0
+    assert "CMakeLists.txt" in capsys.readouterr().out
+    assert "pendulum_jacobian_x" in (tmp_path / "include" / "pendulum" / "pendulum.h").read_text()

@@ -301,3 +301,42 @@ def test_the_importer_is_warned_of_values_that_make_no_sense(folder):
         one.setFloat64([at[module.metadata.x[0]]], [0.1])
     assert "not finite" in messages[0] and "positive" in messages[1] and "cannot be set now" in messages[2]
     one.freeInstance()
+
+
+def test_the_command_writes_an_fmu(tmp_path, capsys):
+    from symdyn.cli import main
+
+    assert main(["export", "pendulum", "--fmu", "--fmi", "2", "--kind", "model_exchange", "--output", str(tmp_path)]) == 0
+    assert "wrote" in capsys.readouterr().out
+    assert validated(tmp_path / "pendulum.fmu") == []
+
+
+def test_rigid_contacts_are_rejected(tmp_path):
+    y = sd.coordinates("y")
+    m, g = sd.parameters("m g", positive=True)
+    system = sd.System("ball", gravity=[0, -g])
+    ball = system.add_body("ball", mass=m)
+    system.add_joint(sd.Prismatic("fall", system.ground, ball, y, axis=[0, 1]))
+    system.add_contact(sd.Contact("floor", ball, system.ground, restitution=0.8))
+    system.defaults, system.initial = {m: 1, g: 9.81}, {y: 1}
+    with pytest.raises(sd.ArgumentError, match="rigid contact floor"):
+        system.embedding().compile(backend="numpy").to_fmu(tmp_path / "ball.fmu")
+
+
+def test_a_name_that_an_fmu_has_itself_is_rejected(tmp_path):
+    q = sd.coordinates("time")
+    m, g = sd.parameters("m g", positive=True)
+    system = sd.System("slow", gravity=[0, -g])
+    body = system.add_body("body", mass=m)
+    system.add_joint(sd.Prismatic("fall", system.ground, body, q, axis=[0, 1]))
+    system.defaults = {m: 1, g: 9.81}
+    with pytest.raises(sd.ArgumentError, match="time would be there twice"):
+        system.embedding().compile(backend="numpy").to_fmu(tmp_path / "slow.fmu")
+
+
+def test_a_module_without_equations_is_rejected(tmp_path, module):
+    from symdyn.runtime.module import Module
+
+    bare = Module(module.metadata, module._provider.__call__, "c")
+    with pytest.raises(sd.ArgumentError, match="without equations"):
+        bare.to_fmu(tmp_path / "bare.fmu")
