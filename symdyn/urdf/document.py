@@ -17,12 +17,18 @@ LONGEST = 4096
 
 @dataclass(frozen=True)
 class Element:
-    """An element: its tag, attributes, children in order, and the line of the file that it begins in."""
+    """An element: its tag, attributes, children in order, the line of the file that it begins in, and its text without the blanks
+    around it."""
 
     tag: str
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
+    written: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        return "".join(self.written).strip()
 
     def find(self, tag: str) -> Element | None:
         """The first child with a tag."""
@@ -61,22 +67,24 @@ class _Builder:
         self.open.pop()
 
     def data(self, text: str) -> None:
-        """Text between tags, which a URDF has no use for."""
+        if self.open:
+            self.open[-1].written.append(text)
 
     def close(self) -> Element | None:
         return self.root
 
 
-def as_path(path: Any) -> Path:
-    """A path given as text or Path. Raises ArgumentError for anything else."""
+def as_path(path: Any, kind: str = "a URDF") -> Path:
+    """A path given as text or Path; kind: of the file, with its article. Raises ArgumentError for anything else."""
     if not isinstance(path, (str, Path)) or "\0" in str(path) or len(str(path)) > LONGEST:
-        raise ArgumentError(f"the path is {shown(path)}; pass that of a URDF file, as text or a Path")
+        raise ArgumentError(f"the path is {shown(path)}; pass that of {kind} file, as text or a Path")
     return Path(path)
 
 
-def read_document(path: Path) -> Element:
-    """The root element of a file.
+def read_document(path: Path, kind: str = "a URDF", given: bytes | None = None) -> Element:
+    """The root element of a file, or of a text that stands for it.
 
+    kind    of the file, with its article, for messages
     Raises ModelError, with file and line, for a file that cannot be read, that is no XML, or that has a document type, by which
     alone entities and other files come in; MissingExtra without defusedxml.
     """
@@ -84,11 +92,11 @@ def read_document(path: Path) -> Element:
         from defusedxml.common import DefusedXmlException
         from defusedxml.ElementTree import DefusedXMLParser
     except ImportError:
-        raise MissingExtra("reading a URDF needs the package defusedxml: pip install 'symdyn[robots]'") from None
+        raise MissingExtra(f"reading {kind} needs the package defusedxml: pip install 'symdyn[robots]'") from None
     try:
-        text = path.read_bytes()
+        text = path.read_bytes() if given is None else given
     except OSError as error:
-        raise ModelError([f"{path}: the file cannot be read ({error.strerror}); pass the path of a URDF file"]) from None
+        raise ModelError([f"{path}: the file cannot be read ({error.strerror}); pass the path of {kind} file"]) from None
     builder = _Builder()
     builder.parser = DefusedXMLParser(target=builder, forbid_dtd=True)
     try:
@@ -97,20 +105,20 @@ def read_document(path: Path) -> Element:
     except DefusedXmlException:
         line = builder.parser.parser.CurrentLineNumber
         raise ModelError([f"{path}:{line}: the file declares a document type, which is rejected: entities and other files come "
-                          "in by it, and a URDF needs none; leave out <!DOCTYPE ...>"]) from None
+                          f"in by it, and {kind} needs none; leave out <!DOCTYPE ...>"]) from None
     except ParseError as error:
-        raise ModelError([f"{path}:{error.position[0]}: {_no_xml(str(error), text, error.position[0])}"]) from None
+        raise ModelError([f"{path}:{error.position[0]}: {_no_xml(str(error), text, error.position[0], kind)}"]) from None
     except (ValueError, LookupError) as error:
         raise ModelError([f"{path}:1: the text cannot be decoded ({error}); save it as UTF-8"]) from None
     assert isinstance(root, Element)
     return root
 
 
-def _no_xml(reason: str, text: bytes, line: int) -> str:
+def _no_xml(reason: str, text: bytes, line: int, kind: str) -> str:
     """What is wrong with text that is no XML."""
     reason = reason.partition(":")[0]
     if not text.strip():
-        return "the file is empty; pass a URDF file"
+        return f"the file is empty; pass {kind} file"
     found = _not_utf8(text)
     if found and "invalid token" in reason:
         return f"{found}, and the file declares no other encoding; save it as UTF-8, or name the encoding in <?xml encoding=...?>"
@@ -119,7 +127,7 @@ def _no_xml(reason: str, text: bytes, line: int) -> str:
         tag = lines[line - 1].strip() if line <= len(lines) else ""
         return (f"a tag has a prefix that the file does not declare, in {shown(tag[:100])}; if it belongs to xacro, run the file "
                 "through xacro first")
-    return f"the file is no XML there ({reason}); pass a URDF file"
+    return f"the file is no XML there ({reason}); pass {kind} file"
 
 
 def _not_utf8(text: bytes) -> str:
