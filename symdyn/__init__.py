@@ -39,6 +39,7 @@ _HOME = {
     "symdyn.flexible.beam": ("Beam",),
     "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
+    "symdyn.mjcf.read": ("read_mjcf",),
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.sympy_mechanics.border": ("from_sympy",),
     "symdyn.sympy_mechanics.system": ("from_system",),

@@ -242,6 +242,7 @@ from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.runtime.losses import Loss as Loss
 from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.sympy_mechanics.system import from_system as from_system
+from symdyn.mjcf.read import read_mjcf as read_mjcf
 from symdyn.urdf.read import read_urdf as read_urdf
 from symdyn.viewer.page import View as View
 

@@ -60,7 +60,7 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     >>> sd.read_urdf(system.to_urdf(f"{tempfile.mkdtemp()}/slider.urdf")).name
     'slider'
     """
-    patterns, held = _patterns(symbolic, "symbolic"), _patterns(fixed, "fixed")
+    wanted, held = patterns(symbolic, "symbolic"), patterns(fixed, "fixed")
     flag(damping, "damping")
     if not isinstance(root, str) or root not in ROOTS:
         raise ArgumentError(f"root is {shown(root)}; pass 'fixed' or 'floating'")
@@ -80,7 +80,7 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     if root == "floating" and all(link.inertial is None or link.inertial.nothing for link in robot.links.values()):
         faults.at(document.line, "no link has mass or inertia, so that nothing can move freely; give one an <inertial>")
     _raise(faults, robot.name)
-    builder = _Builder(robot, _system_name(robot.name or path.stem) if name is None else name, patterns, damping)
+    builder = _Builder(robot, system_name(robot.name or path.stem) if name is None else name, wanted, damping)
     system = builder.system(base, order, following, moving, root == "floating")
     faults += builder.parameters.faults()
     _raise(faults, robot.name)
@@ -92,14 +92,15 @@ def _raise(faults: FileFaults, name: str) -> None:
         raise ModelError(faults, name)
 
 
-def _patterns(given: Any, what: str) -> list[str]:
+def patterns(given: Any, what: str) -> list[str]:
+    """Names with * and ? that an argument gives as one text or several. Raises ArgumentError for anything else."""
     listed = [given] if isinstance(given, str) else list(given) if isinstance(given, (list, tuple, set)) else [given]
     if not all(isinstance(p, str) for p in listed):
         raise ArgumentError(f"{what} is {shown(given)}; pass names as text, such as [\"m_*\"]")
     return listed
 
 
-def _system_name(name: str) -> str:
+def system_name(name: str) -> str:
     """An identifier like the robot's name."""
     found = re.sub(r"\W+", "_", name).strip("_") or "robot"
     return f"robot_{found}" if not found.isidentifier() or keyword.iskeyword(found) else found

@@ -1,0 +1,116 @@
+"""Models in MJCF read by symdyn and compared with MuJoCo: python -m symdyn.lab.robots FOLDER-OR-FILE ..."""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from symdyn.errors import ModelError, ModelWarning, SymdynError
+from symdyn.lab.robots.mujoco_robot import MujocoRobot
+from symdyn.mjcf.compiled import Compiled
+from symdyn.mjcf.read import read_mjcf
+from symdyn.urdf.values import FileFaults
+
+# What a model may differ by.
+AGREEMENT = 1e-12
+# Random states of each model.
+STATES = 5
+
+
+@dataclass
+class Row:
+    """A model that was compared, `fault` empty, or why it was not.
+
+    mass     largest difference of mass, centre of mass and inertia of a body, relative to the largest
+    M, ud    norm of the difference over the norm, of mass matrix and accelerations, the worst state
+    """
+
+    speeds: int = 0
+    constraints: int = 0
+    mass: float = 0.0
+    M: float = 0.0
+    ud: float = 0.0
+    condition: float = 0.0
+    seconds: float = 0.0
+    warned: int = 0
+    fault: str = ""
+
+    def __str__(self) -> str:
+        if self.fault:
+            return self.fault
+        return (f"{self.speeds:>4}{self.constraints:>4}{self.seconds:>7.1f}  {self.mass:8.1e} {self.M:8.1e} {self.ud:8.1e}  "
+                f"{self.condition:7.0e}{'' if self.agrees else '  DIFFERS'}")
+
+    @property
+    def agrees(self) -> bool:
+        return max(self.mass, self.M, self.ud) <= AGREEMENT
+
+
+def models(paths: Sequence[str | Path]) -> Iterator[Path]:
+    """The files that are given, and those in MJCF in folders that are given."""
+    for path in map(Path, paths):
+        yield from [path] if path.is_file() else sorted(
+            p for p in path.rglob("*.xml") if "<mujoco" in p.read_text(encoding="utf-8", errors="replace")[:20000]
+            and "<mujocoinclude" not in p.read_text(encoding="utf-8", errors="replace")[:20000])
+
+
+def measure(path: Path, folder: Path, states: int = STATES, seed: int = 0) -> Row:
+    """The comparison of one model; folder: that holds its files. Raises SymdynError for a model that is not read."""
+    start = clock.perf_counter()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ModelWarning)
+        system = read_mjcf(path, folder=folder)
+        model = system.check()
+        equations = system.augmented() if system.loops or system.constraints else system.embedding()
+        module = equations.compile("numpy")
+    row = Row(len(model.speeds), seconds=clock.perf_counter() - start, warned=len(caught))
+    peer = MujocoRobot(Compiled(path, folder, FileFaults(path)), model)
+    row.mass = peer.weights()
+    rng = np.random.default_rng(seed)
+    for _ in range(states):
+        peer.random(rng)
+        closed = bool(system.loops or system.constraints)
+        if closed and peer.close() > 1e-9:
+            raise SymdynError("no state that fulfils the constraints was found")
+        wanted = peer.constrained() if closed else peer.free()
+        row.constraints = len(peer.constraints()[0]) if closed else 0
+        M = peer.mass_matrix()
+        x = peer.state()
+        found = module.rhs(0.0, x, inputs=peer.commands())
+        n_q, n_u = len(model.coordinates), len(model.speeds)
+        ours = module.mass_matrix(x[:n_q]) if hasattr(module, "mass_matrix") else M
+        row.M = max(row.M, _apart(ours, M))
+        row.ud = max(row.ud, _apart(found[n_q:n_q + n_u], wanted))
+        row.condition = max(row.condition, float(np.linalg.cond(M)))
+    return row
+
+
+def run(paths: Sequence[str | Path], folder: str | Path | None = None, states: int = STATES) -> int:
+    """Print the table; returns how many models that were read differ by more than AGREEMENT.
+
+    folder   that holds the files of all models; default: each model's own
+    """
+    counts = {"read": 0, "agree": 0, "rejected": 0}
+    print(f"{'model':60}{'n_u':>4}{'n_c':>4}{'s':>7}  {'mass':>8} {'M':>8} {'ud':>8}  {'cond M':>7}")
+    for path in models(paths):
+        try:
+            row = measure(path, Path(folder) if folder is not None else path.parent, states)
+            counts["read"] += 1
+            counts["agree"] += row.agrees
+        except SymdynError as error:
+            first = error.faults[0] if isinstance(error, ModelError) else str(error)
+            row = Row(fault="rejected: " + first.replace(str(path.parent) + "/", "")[:150])
+            counts["rejected"] += 1
+        print(f"{'/'.join(path.parts[-3:])[-58:]:60}{row}", flush=True)
+    print(f"{counts['read']} models read, {counts['agree']} agree to {AGREEMENT:.0e}; {counts['rejected']} rejected")
+    return counts["read"] - counts["agree"]
+
+
+def _apart(found: np.ndarray, wanted: np.ndarray) -> float:
+    size = float(np.linalg.norm(wanted))
+    return float(np.linalg.norm(found - wanted)) / size if size else float(np.linalg.norm(found))
