@@ -113,6 +113,7 @@ from symdyn.formulation.by_hand.augmented import augmented as augmented
 from symdyn.formulation.by_hand.embedding import embedding as embedding
 from symdyn.frames import Frame as Frame
 from symdyn.frames import rate as rate
+from symdyn.mjcf.read import read_mjcf as read_mjcf
 from symdyn.model import contacts as contacts
 from symdyn.model import shapes as shapes
 from symdyn.model.closures import Gear as Gear
@@ -242,7 +243,6 @@ from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.runtime.losses import Loss as Loss
 from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.sympy_mechanics.system import from_system as from_system
-from symdyn.mjcf.read import read_mjcf as read_mjcf
 from symdyn.urdf.read import read_urdf as read_urdf
 from symdyn.viewer.page import View as View
 

@@ -30,6 +30,8 @@ class Closures:
             return
         for e in range(m.neq):
             kind = mj.mjtEq(int(m.eq_type[e])).name.removeprefix("mjEQ_")
+            if self.out.named(self.c.name("equality", e)):
+                continue
             if not m.eq_active0[e]:
                 self.out.reported("inactive", "constraints that are not active", "equality", e)
             elif kind in ("CONNECT", "WELD"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +39,10 @@ class Compiled:
             raise ModelError(faults)
         self.title = root.attributes.get("model", "").strip()
         try:
-            self.spec = self.mujoco.MjSpec.from_string(self.expanded.text)
-            self.m = self.spec.compile()
+            with warnings.catch_warnings():  # of elements that later versions of the format do without
+                warnings.simplefilter("ignore", UserWarning)
+                self.spec = self.mujoco.MjSpec.from_string(self.expanded.text)
+                self.m = self.spec.compile()
         except (ValueError, RuntimeError, self.mujoco.FatalError) as error:
             raise ModelError([self._rejection(str(error))]) from None
         types = self.mujoco.mjtObj

@@ -5,6 +5,7 @@ Source: the page Computation of MuJoCo's documentation (passive forces, actuatio
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -90,8 +91,9 @@ class Forces:
         ground = self.system.ground
         if linear:
             body = self.system.add_body(label, J, None)
-            across = np.cross(np.array([1.0 if g != 0 else 0.0 for g in self.system.gravity]), [1.0, 0.0, 0.0])
-            axis = [1, 0, 0] if not across.any() and self.system.gravity[0] == 0 else [0, 1, 0] if not across.any() else across
+            g = np.array(self.m.opt.gravity)
+            across = np.cross(g, np.eye(3)[np.abs(g).argmin()])
+            axis = across / np.linalg.norm(across) if across.any() else np.array([1.0, 0.0, 0.0])
             self.system.add_joint(Prismatic(self.labels.text(label), ground, body, value, axis=[plain(float(e)) for e in axis]))
         else:
             body = self.system.add_body(label, 0, [J, J, J])
@@ -113,7 +115,7 @@ class Forces:
         if parts and parts[0][0] != "JOINT":
             if any(kind != "SITE" for kind, _, _ in parts):
                 return None
-            for (_, a, _), (_, b, _) in zip(parts, parts[1:], strict=False):
+            for (_, a, _), (_, b, _) in pairwise(parts):
                 if self.m.site_bodyid[a] == self.m.site_bodyid[b]:
                     length += plain(float(np.linalg.norm(self.m.site_pos[a] - self.m.site_pos[b])))
                     continue
@@ -138,11 +140,12 @@ class Forces:
         stiffness, higher = float(m.tendon_stiffness[k]), m.tendon_stiffnesspoly[k]
         d, more, J = float(m.tendon_damping[k]), m.tendon_dampingpoly[k], float(m.tendon_armature[k])
         sprung, damped = self.springs and (stiffness or higher.any()), self.dampers and (d or more.any())
-        if not (sprung or damped or J):
+        if not (sprung or damped or J) or self.out.named(name):
             return
         found = self.length(k)
         if found is None or (J and not self._fixed(k)):
-            self.out.rejected("tendon", k, "wraps around geoms or pulleys" if found is None else "goes through sites and has an armature")
+            self.out.rejected("tendon", k, "wraps around geoms or pulleys" if found is None
+                              else "goes through sites and has an armature")
             return
         length, rate = found
         force = sp.S.Zero
@@ -168,7 +171,7 @@ class Forces:
                 if j in self.tree.joints:
                     self.system.add_joint_force(self.tree.joints[j], factor * force, name=f"{label} {n + 1}")
             return
-        for n, ((_, a, _), (_, b, _)) in enumerate(zip(parts, parts[1:], strict=False)):
+        for n, ((_, a, _), (_, b, _)) in enumerate(pairwise(parts)):
             if self.m.site_bodyid[a] != self.m.site_bodyid[b]:
                 body_a, body_b, point_a, point_b = self._ends(a, b)
                 self.system.add_force_between(body_a, body_b, -force, point_a, point_b, name=f"{label} {n + 1}")
@@ -198,7 +201,7 @@ class Forces:
         if moved is None:
             return
         length, rate = moved
-        ratio = moved and self.take("gear", name, float(gear[0]))
+        ratio = self.take("gear", name, float(gear[0]))
         if length is not None:
             length, rate = ratio * length, ratio * rate
         force = self._law(i, gain, bias, self._command(i, name, dynamics), length, rate)
@@ -207,8 +210,8 @@ class Forces:
         self._apply(i, transmission, target, gear, ratio, force, name)
 
     def _moved(self, i: int, transmission: str, target: int, gear: np.ndarray) -> tuple[Any, Any] | None:
-        """Length and rate of what an actuator moves, before its gear, (None, None) where they are no scalars; None where that is
-        held or rejected."""
+        """Length and rate of what an actuator moves, before its gear, (None, None) where they are no scalars; None where that is held
+        or rejected."""
         if transmission == "TENDON":
             found = self.length(target)
             if found is None:
@@ -272,8 +275,8 @@ class Forces:
             R = rotation(self.m.site_quat[target])
             along, about = R @ gear[:3], R @ gear[3:]
             if along.any():
-                self.system.add_force(body, [plain(float(v)) * force for v in along], list(map(plain, map(float, self.m.site_pos[target]))),
-                                      body, name=f"{label}, force")
+                at = [plain(float(v)) for v in self.m.site_pos[target]]
+                self.system.add_force(body, [plain(float(v)) * force for v in along], at, body, name=f"{label}, force")
             if about.any():
                 self.system.add_torque(body, [plain(float(v)) * force for v in about], body, name=f"{label}, torque")
             return
@@ -292,7 +295,7 @@ class Forces:
             return
         q = self.tree.coordinates[target]
         if self.dampers and (d or more.any()):
-            self.system.add_joint_force(joint, -ratio * _damping(plain(d), more, ratio * q.dot), name=f"{label}, damping")
+            self.system.add_joint_force(joint, -ratio**2 * _damping(plain(d), more, q.dot), name=f"{label}, damping")
         if J:
             self._rotor(f"{name} at {self.c.name('joint', target)}", q, J * float(gear[0]) ** 2, self.c.joint(target)[0] == "slide")
 

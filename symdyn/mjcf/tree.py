@@ -31,7 +31,8 @@ class Tree:
 
     def __init__(self, model: Compiled, system: System, patterns: Sequence[str], held: Sequence[str]) -> None:
         self.c, self.m, self.system = model, model.m, system
-        self.names = Names()
+        # The time is t.
+        self.names = Names({"t"})
         self.body_names, self.joint_names = Names({"ground"}), Names()
         self.parameters = Parameters(patterns, self.names)
         self.held = held

@@ -3,6 +3,7 @@ equality constraints that hold exactly."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -73,8 +74,11 @@ class MujocoRobot:
         return np.concatenate([self.d.qpos, self.d.qvel, self.d.act])
 
     def commands(self) -> dict[str, float]:
-        """Values of the inputs, by symdyn's names."""
-        return dict(zip([i.name for i in self.source.inputs], map(float, self.d.ctrl), strict=True))
+        """Values of the inputs, by the names of the actuators."""
+        known = {i.name for i in self.source.inputs}
+        values = {re.sub(r"\W+", "_", self.c.name("actuator", i)).strip("_"): float(self.d.ctrl[int(self.m.actuator_ctrladr[i])])
+                  for i in range(self.m.nu)}
+        return {name: value for name, value in values.items() if name in known}
 
     def free(self) -> np.ndarray:
         """(n_v,) accelerations without equality constraints; their rates of actuators' states after them."""
