@@ -674,6 +674,28 @@ class System:
 
         return write_urdf(self.check(), path)
 
+    def to_mjcf(self, path: str | Path) -> Path:
+        """Write the mechanism as a model of MuJoCo's (MJCF), with the parameters' default numbers.
+
+        Fixed, revolute, prismatic, universal, planar, cylindrical, spherical and free joints are written; those with Euler angles
+        as one slide or hinge a coordinate. Loops by fixed, revolute and spherical joints, gears, constraints y = polynomial of x and
+        dependent coordinates become equality constraints, which are soft in MuJoCo. Forces along joints that are linear in their
+        coordinate, speed and inputs, springs and dampers between points, and forces between points become stiffness, damping,
+        tendons and motors. Bodies without mass between joints vanish; a body on the ground that another joint's coordinate moves is
+        its armature. Outputs, shapes and initial values have no part in it. Coordinates have the same order and meaning; the
+        speeds, too, but those of Free joints with velocity="body". Returns the path.
+
+        Raises ModelError with all faults: of the description, what MJCF has no words for, moving bodies that MuJoCo rejects,
+        parameters without a number, and a file that cannot be written; ArgumentError for a path that is none.
+
+        >>> import tempfile
+        >>> sd.systems.spatial_chain(3).to_mjcf(f"{tempfile.mkdtemp()}/chain.xml").name
+        'chain.xml'
+        """
+        from symdyn.mjcf.write import write_mjcf
+
+        return write_mjcf(self.check(), path)
+
     def _frame(self, given: Any, what: str) -> Any:
         """A ReferenceFrame that was given, or None."""
         try:

@@ -10,7 +10,8 @@ import numpy as np
 
 from symdyn.errors import SymdynError
 from symdyn.mjcf.compiled import Compiled, rotation
-from symdyn.model.record import Model
+from symdyn.mjcf.parts import Numbers, scalars_of
+from symdyn.model.record import Model, joint_speeds
 
 # Of Newton's method for states that fulfil the constraints, m or rad.
 _CLOSED, _STEPS = 1e-14, 60
@@ -32,10 +33,25 @@ class MujocoRobot:
         self.m.jnt_actfrclimited[:] = 0
         self.m.tendon_actfrclimited[:] = 0
         self.d = self.mj.MjData(self.m)
-        there = [compiled.name("joint", j) for j in range(self.m.njnt)]
-        here = [j.name for j in model.joints if j.coordinates and not j.name.startswith("armature of ")]
-        if here != there:
-            raise SymdynError(f"symdyn has the joints {here}, MuJoCo {there}")
+        self.q_at, self.u_at = self._addresses()
+
+    def _addresses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where symdyn's coordinates and speeds are among MuJoCo's, by the names of the joints."""
+        numbers, at = Numbers(self.source, []), {self.c.name("joint", j): self.c.joint(j)[1:] for j in range(self.m.njnt)}
+        q_at, u_at = dict.fromkeys(self.source.coordinates, -1), dict.fromkeys(self.source.speeds, -1)
+        for joint in self.source.joints:
+            found = [(s.name, [s.coordinate], [s.speed]) for s in scalars_of(joint, numbers)]
+            for name, own, speeds in found or [(joint.name, list(joint.coordinates), list(joint_speeds(joint)))]:
+                if name in at:
+                    for n, q in enumerate(own):
+                        q_at[q] = at[name][0] + n
+                    for n, u in enumerate(speeds):
+                        u_at[u] = at[name][1] + n
+        missing = [str(s) for taken in (q_at, u_at) for s, k in taken.items() if k < 0]
+        if missing or len(u_at) != self.m.nv:
+            raise SymdynError(f"MuJoCo has {self.m.nv} speeds, symdyn {len(u_at)}, of which {', '.join(missing) or 'none'} are missing "
+                              "there")
+        return np.array(list(q_at.values()), dtype=int), np.array(list(u_at.values()), dtype=int)
 
     def weights(self) -> float:
         """Largest difference of the bodies' masses, centres of mass and inertias, relative to the largest there is."""
@@ -70,8 +86,8 @@ class MujocoRobot:
         d.act[:] = rng.uniform(-1, 1, m.na)
 
     def state(self) -> np.ndarray:
-        """x = [q, u, states of actuators], in symdyn's order: joints in MuJoCo's order have the same coordinates and speeds."""
-        return np.concatenate([self.d.qpos, self.d.qvel, self.d.act])
+        """x = [q, u, states of actuators], in symdyn's order."""
+        return np.concatenate([self.d.qpos[self.q_at], self.d.qvel[self.u_at], self.d.act])
 
     def commands(self) -> dict[str, float]:
         """Values of the inputs, by the names of the actuators."""

@@ -14,6 +14,7 @@ from symdyn.errors import ModelError, ModelWarning, SymdynError
 from symdyn.lab.robots.mujoco_robot import MujocoRobot
 from symdyn.mjcf.compiled import Compiled
 from symdyn.mjcf.read import read_mjcf
+from symdyn.model.system import System
 from symdyn.urdf.values import FileFaults
 
 # What a model may differ by.
@@ -37,7 +38,6 @@ class Row:
     ud: float = 0.0
     condition: float = 0.0
     seconds: float = 0.0
-    warned: int = 0
     fault: str = ""
 
     def __str__(self) -> str:
@@ -62,15 +62,28 @@ def models(paths: Sequence[str | Path]) -> Iterator[Path]:
 def measure(path: Path, folder: Path, states: int = STATES, seed: int = 0) -> Row:
     """The comparison of one model; folder: that holds its files. Raises SymdynError for a model that is not read."""
     start = clock.perf_counter()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", ModelWarning)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
         system = read_mjcf(path, folder=folder)
+    row = measure_system(system, path, folder, states, seed)
+    row.seconds = clock.perf_counter() - start
+    return row
+
+
+def measure_system(system: System, path: Path, folder: Path, states: int = STATES, seed: int = 0,
+                   weights: bool = True) -> Row:
+    """The comparison of a system with the file that it was read from, or written to, with numbers for all parameters.
+
+    weights   whether to compare the inertia of the bodies
+    Raises SymdynError."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
         model = system.check()
         equations = system.augmented() if system.loops or system.constraints else system.embedding()
         module = equations.compile("numpy")
-    row = Row(len(model.speeds), seconds=clock.perf_counter() - start, warned=len(caught))
+    row = Row(len(model.speeds))
     peer = MujocoRobot(Compiled(path, folder, FileFaults(path)), model)
-    row.mass = peer.weights()
+    row.mass = peer.weights() if weights else 0.0
     rng = np.random.default_rng(seed)
     for _ in range(states):
         peer.random(rng)
@@ -83,9 +96,9 @@ def measure(path: Path, folder: Path, states: int = STATES, seed: int = 0) -> Ro
         x = peer.state()
         found = module.rhs(0.0, x, inputs=peer.commands())
         n_q, n_u = len(model.coordinates), len(model.speeds)
-        ours = module.mass_matrix(x[:n_q]) if hasattr(module, "mass_matrix") else M
-        row.M = max(row.M, _apart(ours, M))
-        row.ud = max(row.ud, _apart(found[n_q:n_q + n_u], wanted))
+        ours = module.mass_matrix(x[:n_q])
+        row.M = max(row.M, _apart(ours, M[np.ix_(peer.u_at, peer.u_at)]))
+        row.ud = max(row.ud, _apart(found[n_q:n_q + n_u], wanted[peer.u_at]))
         row.condition = max(row.condition, float(np.linalg.cond(M)))
     return row
 
