@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from symdyn.model.joints import Fixed, Free, Joint, Spherical
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import symbols_of
+from symdyn.urdf.poses import Pose
 
 
 class Numbers:
@@ -85,43 +86,8 @@ def scalars_of(joint: Joint, numbers: Numbers, number: int = -1) -> Iterator[Sca
         yield Scalar(name, kind, axis, joint.coordinates[k], speeds[k], number)
 
 
-@dataclass(frozen=True)
-class Pose:
-    """Rotation (3, 3) and origin (3,) of a frame in another."""
-
-    R: np.ndarray = field(default_factory=lambda: np.eye(3))
-    p: np.ndarray = field(default_factory=lambda: np.zeros(3))
-
-    @classmethod
-    def of_joint(cls, joint: Joint, numbers: Numbers) -> Pose:
-        """Of the child in the parent where the joint's coordinates are zero."""
-        on_parent, on_child = (cls(numbers.array(R), numbers.array(p).ravel()) for R, p in (
-            (joint.parent_rotation, joint.parent_point), (joint.child_rotation, joint.child_point)))
-        return on_parent @ on_child.inverse()
-
-    def __matmul__(self, other: Pose) -> Pose:
-        return Pose(self.R @ other.R, self.p + self.R @ other.p)
-
-    def inverse(self) -> Pose:
-        return Pose(self.R.T, -(self.R.T @ self.p))
-
-    def point(self, at: np.ndarray) -> np.ndarray:
-        return np.asarray(self.p + self.R @ at)
-
-    @property
-    def position(self) -> str:
-        return " ".join(repr(float(v) + 0.0) for v in self.p)
-
-    @property
-    def quaternion(self) -> str:
-        """Text of the unit quaternion, w first. Source: the largest of its four components first (Shepperd 1978)."""
-        R = self.R
-        squares = np.array([1 + R[0, 0] + R[1, 1] + R[2, 2], 1 + R[0, 0] - R[1, 1] - R[2, 2], 1 - R[0, 0] + R[1, 1] - R[2, 2],
-                            1 - R[0, 0] - R[1, 1] + R[2, 2]])
-        products = np.array([[0, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-                             [0, 0, R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]], [0, 0, 0, R[1, 2] + R[2, 1]], [0, 0, 0, 0]])
-        products = products + products.T + np.diag(squares)
-        k = int(squares.argmax())
-        e = products[k] / (2 * np.sqrt(squares[k]))
-        e = e / np.linalg.norm(e)
-        return " ".join(repr(float(v) + 0.0) for v in (-e if e[0] < 0 else e))
+def pose_of(joint: Joint, numbers: Numbers) -> Pose:
+    """Of the child in the parent where the joint's coordinates are zero."""
+    on_parent, on_child = (Pose(numbers.array(R), numbers.array(p).ravel()) for R, p in (
+        (joint.parent_rotation, joint.parent_point), (joint.child_rotation, joint.child_point)))
+    return on_parent @ on_child.inverse()

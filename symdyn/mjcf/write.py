@@ -14,13 +14,14 @@ import sympy as sp
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.mjcf.document import KIND
 from symdyn.mjcf.equalities import Equalities
-from symdyn.mjcf.parts import Numbers, Pose, Scalar, scalars_of
+from symdyn.mjcf.parts import Numbers, Scalar, pose_of, scalars_of
 from symdyn.model.joints import Fixed, Free, Joint, Prismatic, Revolute, Spherical
 from symdyn.model.loads import ForceBetween, JointForce, SpringDamper
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, Input, symbols_of
 from symdyn.shown import shown
 from symdyn.urdf.document import as_path
+from symdyn.urdf.poses import Pose
 
 # Moments of inertia below this MuJoCo rejects, kg m^2, and masses, kg.
 _LEAST = 1e-15
@@ -147,7 +148,7 @@ class _Writer:
         """A body with its joints, of which those on bodies without mass are taken together, and all that hangs on it."""
         chain = self._chain(first)
         body = self.model.children[chain[-1]]
-        poses = [Pose.of_joint(self.model.joints[k], self.numbers) for k in chain]
+        poses = [pose_of(self.model.joints[k], self.numbers) for k in chain]
         # Of each child's frame in the chain the pose of the last, where all coordinates are zero.
         outer = [Pose()]
         for pose in reversed(poses[1:]):
@@ -155,7 +156,8 @@ class _Writer:
         outer.reverse()
         whole = poses[0] @ outer[0]
         name = self.model.bodies[body].name
-        yield f'<body name={quoteattr(name)} pos="{whole.position}" quat="{whole.quaternion}">'
+        at = f'pos="{self.numbers.texts(whole.p)}" quat="{self.numbers.texts(whole.quaternion)}"'
+        yield f"<body name={quoteattr(name)} {at}>"
         yield f"  {self._inertial(body)}"
         for k, after in zip(chain, outer, strict=True):
             yield from (f"  {line}" for line in self._joints(self.model.joints[k], after, whole))
@@ -322,6 +324,6 @@ class _Writer:
         number = next((k for k, b in enumerate(self.model.bodies) if body in (b, b.name)), -1)
         name = f"site {sum(map(len, self.sites.values())) + 1}"
         pose = Pose(np.eye(3) if R is None else self.numbers.array(R), self.numbers.array(point).ravel())
-        turned = "" if R is None else f' quat="{pose.quaternion}"'
-        self.sites.setdefault(number, []).append(f'<site name="{name}" pos="{pose.position}"{turned}/>')
+        turned = "" if R is None else f' quat="{self.numbers.texts(pose.quaternion)}"'
+        self.sites.setdefault(number, []).append(f'<site name="{name}" pos="{self.numbers.texts(pose.p)}"{turned}/>')
         return name
