@@ -40,6 +40,7 @@ _HOME = {
     "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
     "symdyn.mjcf.read": ("read_mjcf",),
+    "symdyn.sdf.read": ("read_sdf",),
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.sympy_mechanics.border": ("from_sympy",),
     "symdyn.sympy_mechanics.system": ("from_system",),

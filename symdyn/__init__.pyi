@@ -113,6 +113,7 @@ from symdyn.formulation.by_hand.augmented import augmented as augmented
 from symdyn.formulation.by_hand.embedding import embedding as embedding
 from symdyn.frames import Frame as Frame
 from symdyn.frames import rate as rate
+from symdyn.sdf.read import read_sdf as read_sdf
 from symdyn.mjcf.read import read_mjcf as read_mjcf
 from symdyn.model import contacts as contacts
 from symdyn.model import shapes as shapes

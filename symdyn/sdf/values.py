@@ -1,0 +1,77 @@
+"""Numbers, names and poses that stand in the elements of an SDF."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from symdyn.shown import shown
+from symdyn.urdf.angles import rotation
+from symdyn.urdf.document import Element
+from symdyn.urdf.poses import Pose
+from symdyn.urdf.values import FileFaults
+
+KIND = "an SDF"
+
+
+class Values(FileFaults):
+    """Faults of a file, and the values of its elements, whose numbers are checked as those of a URDF's attributes."""
+
+    def numbers(self, element: Element, what: str, n: int) -> list[float]:
+        """The numbers that an element holds."""
+        stands = Element(element.tag, {"text": element.text}, element.line)
+        return self._numbers(stands, "text", what, n, None)
+
+    def number_in(self, parent: Element | None, tag: str, what: str, default: float) -> float:
+        """The number that a child holds; default: where there is none."""
+        found = None if parent is None else parent.find(tag)
+        return default if found is None else self.numbers(found, what, 1)[0]
+
+    def word(self, parent: Element, tag: str, what: str) -> str:
+        """The text that a child holds, "" and a fault where there is none."""
+        found = parent.find(tag)
+        text = "" if found is None else found.text
+        if not text:
+            self.at(parent.line, f"{what} has no <{tag}>; write <{tag}>...</{tag}>")
+        return text
+
+    def true(self, parent: Element, tag: str) -> bool:
+        """Whether a child holds true or 1."""
+        found = parent.find(tag)
+        return found is not None and found.text in ("true", "1")
+
+    def pose(self, parent: Element, what: str) -> tuple[str, Pose, int]:
+        """The frame that the <pose> of an element is relative to ("": the default), the pose, and its line."""
+        found = parent.find("pose")
+        if found is None:
+            return "", Pose(), parent.line
+        if found.attributes.get("frame"):
+            self.at(found.line, f"{what}: <pose> has the attribute frame={shown(found.attributes['frame'])}, which versions before 1.7 "
+                                "left without a meaning; write relative_to of version 1.7")
+        form = found.attributes.get("rotation_format", "euler_rpy")
+        if not found.text:
+            numbers = [0.0] * 6 if form == "euler_rpy" else [0.0] * 6 + [1.0]
+        elif form not in ("euler_rpy", "quat_xyzw"):
+            self.at(found.line, f"{what}: <pose> has the rotation_format {shown(form)}; there are euler_rpy and quat_xyzw")
+            return "", Pose(), found.line
+        else:
+            numbers = self.numbers(found, what, 6 if form == "euler_rpy" else 7)
+        if form == "quat_xyzw":
+            R = self._turned(numbers[3:], what, found.line)
+        else:
+            degrees = found.attributes.get("degrees") in ("true", "1")
+            roll, pitch, yaw = (math.radians(a) for a in numbers[3:]) if degrees else numbers[3:]
+            R = np.array(rotation((roll, pitch, yaw)))
+        return found.attributes.get("relative_to", ""), Pose(R, np.array(numbers[:3])), found.line
+
+    def _turned(self, quaternion: list[float], what: str, line: int) -> np.ndarray:
+        x, y, z, w = quaternion
+        size = math.hypot(x, y, z, w)
+        if abs(size - 1) > 1e-3:
+            self.at(line, f"{what}: the quaternion of <pose> has the length {size:.6g}; give a unit quaternion, x y z w")
+            return np.eye(3)
+        x, y, z, w = x / size, y / size, z / size, w / size
+        return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
