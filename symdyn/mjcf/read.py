@@ -14,7 +14,9 @@ from symdyn.mjcf.compiled import Compiled
 from symdyn.mjcf.document import KIND
 from symdyn.mjcf.forces import Forces
 from symdyn.mjcf.left_out import LeftOut, examine
+from symdyn.mjcf.pictures import draw
 from symdyn.mjcf.tree import Tree
+from symdyn.kinds import flag
 from symdyn.model.system import System
 from symdyn.shown import shown
 from symdyn.urdf.document import as_path
@@ -23,7 +25,7 @@ from symdyn.urdf.values import FileFaults, nearest
 
 
 def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | None = None, fixed: str | Sequence[str] = (),
-              leave_out: str | Sequence[str] = (), folder: str | Path | None = None) -> System:
+              leave_out: str | Sequence[str] = (), folder: str | Path | None = None, visuals: bool = False) -> System:
     """The mechanism that a model of MuJoCo's describes: its bodies, joints, equality constraints, springs, tendons, actuators.
 
     path       of the file, or its text, which begins with "<"
@@ -36,6 +38,7 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     leave_out  what the motion is to do without: names of elements that are not built, and of what a warning reports otherwise, the
                kinds "contacts", "limits", "friction", "ranges", "inactive" and "mocap", with * and ?
     folder     that no file of the model may be outside of; default: that of the file
+    visuals    whether bodies look in pictures as the geoms of the groups 0 to 2, each with 800 triangles at most
 
     MuJoCo's own compiler resolves default classes, frames, orientations and inertias of geoms. Coordinates are MuJoCo's: q_JOINT of
     hinges and slides, e0_ ... e3_JOINT of balls, and before these x_, y_, z_JOINT of free joints; so are the speeds, and the initial
@@ -56,6 +59,7 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     ((q_hinge,), (torque,))
     """
     wanted, held, without = patterns(symbolic, "symbolic"), patterns(fixed, "fixed"), patterns(leave_out, "leave_out")
+    flag(visuals, "visuals")
     written = isinstance(path, str) and path.lstrip("\ufeff \t\r\n").startswith("<")
     given = path.lstrip("\ufeff \t\r\n").encode() if isinstance(path, str) and written else None
     taken = Path("text") if written else as_path(path, KIND)
@@ -75,6 +79,8 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     forces = Forces(tree, out)
     forces.build()
     Closures(tree, forces).build()
+    if visuals:
+        draw(tree)
     system.set_defaults(tree.parameters.defaults)
     faults += [*tree.parameters.faults(), *out.faults()]
     if faults:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.model.faults import Faults
@@ -21,6 +22,8 @@ from symdyn.shown import name_of, shown
 # Text that may be a colour: #rrggbb, a grey level such as 0.8, or a name; which names there are is known to what draws.
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}|[01]?\.?\d+|[A-Za-z: ]+")
 Row = tuple[sp.Expr, ...]
+# Vertices of a mesh: pages hold indices of two bytes.
+MOST = 20_000
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,42 @@ class Line(Shape):
         ends = isinstance(self.to, (tuple, list)) and len(self.to) == 2
         return {"kind": "line", "width": self.width,
                 "to": getattr(self.to[0], "name", self.to[0]) if ends else None}  # type: ignore[index]
+
+
+@dataclass(frozen=True)
+class Mesh(Shape):
+    """Triangles: vertices (n, 3) in m, numbers; faces (m, 3), indices of vertices, counter-clockwise from outside.
+
+    It may have any form; pictures that are drawn without depth sort its triangles by their distance.
+    """
+
+    vertices: Any
+    faces: Any
+
+    def values(self, faults: Faults, what: str, planar: bool) -> dict[str, tuple[Row, ...]]:
+        vertices, faces = self._arrays()
+        if vertices is None or vertices.shape[1:] != (3,) or not len(vertices) or not np.isfinite(vertices).all():
+            faults.append(f"{what}: vertices is {shown(self.vertices)}; pass finite numbers, (n, 3)")
+        elif faces is None or faces.shape[1:] != (3,) or not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+            faults.append(f"{what}: faces is {shown(self.faces)}; pass (m, 3) indices from 0 to {len(vertices) - 1}")
+        elif len(vertices) > MOST:
+            faults.append(f"{what}: it has {len(vertices)} vertices; pass {MOST} at most")
+        return {}
+
+    def _arrays(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        try:
+            faces = np.array(self.faces)
+            return np.array(self.vertices, dtype=float), faces if faces.dtype.kind in "iu" else None
+        except (TypeError, ValueError):
+            return None, None
+
+    @property
+    def about(self) -> dict[str, Any]:
+        vertices, faces = self._arrays()
+        if vertices is None or faces is None:
+            return {"kind": "mesh", "vertices": [], "faces": []}
+        short = [[float(f"{v:.5g}") for v in row] for row in np.atleast_2d(vertices).tolist()]
+        return {"kind": "mesh", "vertices": short, "faces": np.atleast_2d(faces).tolist()}
 
 
 @dataclass(frozen=True)

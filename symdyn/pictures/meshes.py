@@ -24,6 +24,7 @@ class Part:
     faces      vertices of each, counter-clockwise from outside; corners: (m, 4), four of them, which define the plane
     hidden     (k, 4), corners of planes where pieces touch: never drawn, but they part the pieces
     edges      (k, 4): two vertices, two faces (-1: none); creases: (k,), drawn from every side, others as outlines alone
+    convex     whether it is; of any other, triangles are drawn by their distance, and `hidden` is a box around it
     width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another
     """
 
@@ -38,6 +39,7 @@ class Part:
     creases: np.ndarray
     width: float = 0.4
     to: int | None = None
+    convex: bool = True
 
 
 def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None = None, bends: bool = False) -> Iterator[Part]:
@@ -50,6 +52,8 @@ def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None 
         if bends:
             points, widths = _finer(points), _finer(widths, points)
         yield sweep(body, color, points, widths, values["direction"][0] if "direction" in values else None)
+    elif record["kind"] == "mesh":
+        yield _triangles(body, color, np.array(record["vertices"]), np.array(record["faces"], dtype=int))
     elif record["kind"] == "line":
         points = values["points"].reshape(-1, 3)
         if bends and to is None:
@@ -87,6 +91,16 @@ def line(body: int, color: Color, points: np.ndarray, width: float, to: int | No
     nothing = np.zeros((0, 4), dtype=int)
     edges = np.array([[k, k + 1, -1, -1] for k in range(len(points) - 1)])
     return Part(body, color, points, points, (), nothing, nothing, edges, np.ones(len(edges), dtype=bool), width, to)
+
+
+def _triangles(body: int, color: Color, vertices: np.ndarray, faces: np.ndarray) -> Part:
+    """Triangles of any form, and the corners of the box around them, which no triangle has."""
+    ends = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in range(2) for j in range(2) for k in range(2)])
+    sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]) + len(vertices)
+    every = np.vstack([vertices, corners])
+    return Part(body, color, every, every, tuple(faces), faces[:, [0, 0, 1, 2]], sides, np.zeros((0, 4), dtype=int),
+                np.zeros(0, dtype=bool), convex=False)
 
 
 def _box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np.ndarray | None) -> Iterator[Part]:

@@ -57,6 +57,10 @@ class Scene(PolyCollection):
             normals, offsets = planes(places, part.corners)
             seen = np.append((camera.side(normals, offsets) > 0) & normals.any(axis=1), False)
             faces, own = np.flatnonzero(seen), part.edges[:, 2:]
+            if not part.convex:
+                way = camera.toward(places.mean(axis=0))
+                middles = [camera.distance(places[part.faces[k]].mean(axis=0), way) for k in faces]
+                faces = faces[np.argsort(middles)[::-1]]
             edges = np.where(part.creases, seen[own].any(axis=1) | (own < 0).all(axis=1), seen[own].sum(axis=1) == 1)
             shaded = np.clip(np.array(part.color) * (_SHADE + (1 - _SHADE) * (1 + normals[faces] @ light) / 2)[:, None], 0, 1)
             dark = np.array(part.color) * (_EDGE if len(part.faces) else 1.0)

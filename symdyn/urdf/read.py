@@ -29,12 +29,14 @@ from symdyn.urdf.parameters import Names, Parameters, plain
 from symdyn.urdf.parse import parse
 from symdyn.urdf.robot import GRAVITY, ZERO, Inertial, Link, Origin, Robot, UrdfJoint
 from symdyn.urdf.values import FileFaults, nearest
+from symdyn.urdf.visuals import Visuals
 
 ROOTS = ("fixed", "floating")
 
 
 def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "fixed", name: str | None = None,
-              fixed: str | Sequence[str] = (), damping: bool = False) -> System:
+              fixed: str | Sequence[str] = (), damping: bool = False, visuals: bool = False,
+              folder: str | Path | None = None) -> System:
     """The mechanism that a URDF file describes, under gravity of 9.81 m/s^2 along -z.
 
     symbolic   what becomes a parameter instead of a number, the number of the file its default: names of parameters (m_LINK,
@@ -45,14 +47,17 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     name       of the system; default: the file's name of the robot
     fixed      names of joints, with * and ?, that are held where their coordinate is zero
     damping    whether joints with one coordinate of their own have the viscous damping of <dynamics>
+    visuals    whether bodies look in pictures as <visual> draws them: boxes, spheres, cylinders and meshes (STL, OBJ, DAE, read by
+               trimesh), each with 800 triangles at most
+    folder     that no mesh may be outside of, and where package:// begins; default: that of the file
 
     Bodies are the links, with the links' frames. A joint's coordinate is q_JOINT (planar: x_, y_, theta_JOINT; floating: x_,
     y_, z_, e0_ ... e3_JOINT), where every character that no symbol has is an underscore. A joint that mimics another has no
     coordinate, but multiplier q + offset in terms of the other's; the drive of q then moves both. A link without <inertial> has
-    no mass. Friction, limits, drives, meshes and whatever else is in the file are not looked at, nor are files it refers to.
+    no mass. Friction, limits, drives and whatever else is in the file are not looked at, nor are files it refers to but with `visuals`.
 
     Raises ModelError that lists every fault of the file with its line; ArgumentError for an unknown root, and for a path and
-    names that are none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
+    names that are none; MissingExtra without defusedxml, with meshes without trimesh. Source of the format: wiki.ros.org/urdf/XML.
 
     >>> import tempfile
     >>> system = sd.System("slider", gravity=[0, 0, -9.81])
@@ -62,6 +67,7 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     """
     wanted, held = patterns(symbolic, "symbolic"), patterns(fixed, "fixed")
     flag(damping, "damping")
+    flag(visuals, "visuals")
     if not isinstance(root, str) or root not in ROOTS:
         raise ArgumentError(f"root is {shown(root)}; pass 'fixed' or 'floating'")
     path = as_path(path)
@@ -83,6 +89,8 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     builder = _Builder(robot, system_name(robot.name or path.stem) if name is None else name, wanted, damping)
     system = builder.system(base, order, following, moving, root == "floating")
     faults += builder.parameters.faults()
+    if visuals:
+        Visuals(faults, path.parent if folder is None else as_path(folder, "the folder of a URDF")).draw(document, builder.bodies, system)
     _raise(faults, robot.name)
     return system
 
