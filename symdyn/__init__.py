@@ -42,6 +42,8 @@ _HOME = {
     "symdyn.mjcf.read": ("read_mjcf",),
     "symdyn.sdf.read": ("read_sdf",),
     "symdyn.urdf.read": ("read_urdf",),
+    "symdyn.datafile.read": ("read_system",),
+    "symdyn.datafile.schema": ("data_file_schema",),
     "symdyn.sympy_mechanics.border": ("from_sympy",),
     "symdyn.sympy_mechanics.system": ("from_system",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),

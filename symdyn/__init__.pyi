@@ -16,6 +16,8 @@ from symdyn.comparison import Slide as Slide
 from symdyn.comparison import compare as compare
 from symdyn.comparison import conventions as conventions
 from symdyn.comparison import proofs as proofs
+from symdyn.datafile.read import read_system as read_system
+from symdyn.datafile.schema import data_file_schema as data_file_schema
 from symdyn.ensembles import Ensemble as Ensemble
 from symdyn.ensembles import Samples as Samples
 from symdyn.ensembles import ensemble as ensemble

@@ -519,7 +519,7 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["derive", "puma560", "--option", "convention=mine"], "puma560 has no convention 'mine'"),
     (["derive", "pendulum", "--quantity", "N_tilde"], "no quantity 'N_tilde'; it has"),
     (["simulat", "pendulum"], "there is no command 'simulat'; did you mean simulate"),
-    (["xyz"], "there is no command 'xyz'; there are list, derive,"),
+    (["xyz"], "there is no command 'xyz'; there are list, schema, derive,"),
     (["export", "pendulum"], "nothing to export: pass one of --casadi, --jax, --torch"),
     (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, javascript, numpy"),
     (["generate", "pendulum", "--functions", "lhs"], "no function lhs; it has rhs"),

@@ -1,5 +1,5 @@
-"""The command line: symdyn list | derive | generate | export | simulate | view | sweep | report | diagnose | compare | bench |
-stress | demo.
+"""The command line: symdyn list | schema | derive | generate | export | simulate | view | sweep | report | diagnose | compare |
+bench | stress | demo.
 
 Everything is imported when it is needed, so that help and list come at once and a simulation that was done before
 starts without SymPy. Exit codes: 0 done, 1 it could not be done, 2 it was asked wrongly, 3 the simulation stopped

@@ -25,12 +25,12 @@ def find_system(name: str, options: Mapping[str, Any]) -> System:
     if name in systems.names():
         check_options(name, getattr(systems, name), options)
         return systems.get(name, **options)
-    if name.endswith(".py") or Path(name).is_file():
+    if name.endswith((".py", ".toml")) or Path(name).is_file():
         return from_file(Path(name), options)
     try:
         return systems.get(name)
     except SymdynError as error:
-        raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
+        raise Stop(f"{error}; the path of a Python file that defines system(), or of a TOML data file, is taken too") from None
 
 
 def find_equations(arguments: argparse.Namespace,

@@ -20,7 +20,7 @@ def is_file(name: str) -> bool:
     """Whether a name stands for a user's file; a file that is called as a mechanism does not take its place."""
     from symdyn.bench.work.cases import known
 
-    return name.endswith(".py") or (name not in known() and Path(name).is_file())
+    return name.endswith((".py", ".toml")) or (name not in known() and Path(name).is_file())
 
 
 def find_mechanism(name: str, options: Mapping[str, Any]) -> System:
@@ -65,6 +65,6 @@ def _refused() -> Iterator[None]:
     try:
         yield
     except Unknown as error:
-        raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
+        raise Stop(f"{error}; the path of a Python file that defines system(), or of a TOML data file, is taken too") from None
     except ArgumentError as error:
         raise Stop(str(error)) from None

@@ -19,6 +19,7 @@ from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.measurements import MEASUREMENTS, overview
 from symdyn.cli.report import report
+from symdyn.cli.schema import schema
 from symdyn.cli.simulate import simulate
 from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
@@ -48,13 +49,14 @@ def make_parser() -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=text, description=text)
         sub.set_defaults(run=run)
         if system:
-            sub.add_argument("system", metavar="NAME", help="a system of the catalogue (see symdyn list), or a Python "
-                             "file that defines system()")
+            sub.add_argument("system", metavar="NAME", help="a system of the catalogue (see symdyn list), a Python "
+                             "file that defines system(), or a TOML data file (see symdyn schema)")
             sub.add_argument("--option", metavar="KEY=VALUE", nargs="+", action="extend", default=[],
                              help="options of the system, such as n=5")
         return sub
 
     command("list", list_systems, "list the systems of the catalogue", system=False)
+    command("schema", schema, "print the JSON schema of data files, by which editors complete them", system=False)
 
     def formulation(sub: argparse.ArgumentParser, default: str | None = "auto") -> argparse.ArgumentParser:
         default_text = default or "embedding, of closed loops and constraints augmented"

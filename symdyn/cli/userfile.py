@@ -1,4 +1,5 @@
-"""What a Python file of the user describes: a system, or cases of printed formulas. The file is a program, and is run."""
+"""What a file of the user describes: a system, or cases of printed formulas. A Python file is a program, and is run; a TOML file
+is data, and is read."""
 
 from __future__ import annotations
 
@@ -23,7 +24,10 @@ def from_file(path: Path, options: Mapping[str, Any]) -> System:
 
 
 def maker(path: Path) -> Callable[..., System]:
-    """system() of a user's file, which is run once; what it raises, now or when it is called, is reported as the user's fault."""
+    """system() of a user's file, which is run once; what it raises, now or when it is called, is reported as the user's fault.
+    Of a data file, what it describes."""
+    if path.suffix == ".toml":
+        return functools.partial(_of_data, path)
     function = _run(path, lambda module: getattr(module, "system", None))
     if not callable(function):
         raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
@@ -40,6 +44,15 @@ def maker(path: Path) -> Callable[..., System]:
         return result
 
     return make
+
+
+def _of_data(path: Path, **options: Any) -> System:
+    """The system of a data file, which nothing of is run."""
+    from symdyn.datafile.read import read_system
+
+    if options:
+        raise Stop(f"{path} is a data file, which takes no --option; change its numbers, or pass --set")
+    return read_system(path)
 
 
 def cases_from_file(path: Path) -> list[Case]:

@@ -696,6 +696,21 @@ class System:
 
         return write_mjcf(self.check(), path)
 
+    def to_toml(self, path: str | Path | None = None) -> str:
+        """The description as a data file in TOML, which `sd.read_system` makes an equal system of: the same generated code.
+
+        path   where to write it, a file that ends in .toml; default: nowhere
+        Returns the text. Every element is written, with symbols, numbers and units; expressions as texts that a strict parser
+        reads back. Raises ModelError with all faults: of the description, functions of the user (sd.External), which are
+        programs, and whatever else a data file has no words for; ArgumentError for another ending.
+
+        >>> print(sd.systems.pendulum().to_toml().splitlines()[2])
+        name = "pendulum"
+        """
+        from symdyn.datafile.write import write_system
+
+        return write_system(self, path)
+
     def _frame(self, given: Any, what: str) -> Any:
         """A ReferenceFrame that was given, or None."""
         try:
