@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,11 +57,27 @@ class Call:
            by commas, {n_in} and {n_out} the numbers of arguments and results, and {code} to return where it fails
     item   what then reads result {k}
     argument   how one of the arguments is written, with {value}
+    continued  what ends a line of arguments that goes on in the next
     """
 
     take: str
     item: str
     argument: str = "{value}"
+    continued: str = ""
+
+
+class Caseless(set[str]):
+    """Names of which those that differ in capitals alone are the same."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        super().__init__(map(str.casefold, names))
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(str(name).casefold())
+
+    def add(self, name: str) -> None:
+        """Add a name."""
+        super().add(name.casefold())
 
 
 @dataclass(frozen=True)
@@ -77,6 +94,8 @@ class Dialect:
     parts        how long functions are divided; None if they are not
     read         format of an assignment of what does not depend on a direction, where statements are those of directions
     zeros        a statement that makes all {n} results zero, before the others of many zeros; None: each is stored
+    words        what names in this language must not be, besides the words that no language has as names
+    caseless     names that differ in capitals alone are the same
     madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
 
@@ -96,6 +115,12 @@ class Dialect:
     call: Call | None = None
     zeros: str | None = None
     read: str | None = None
+    words: tuple[str, ...] = ()
+    caseless: bool = False
+
+    def names(self) -> set[str]:
+        """The names that are taken before any is given, as `identifier` looks at them."""
+        return Caseless([*RESERVED, *self.words]) if self.caseless else set(self.words)
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -120,7 +145,7 @@ def read_dialect(folder: Path) -> Dialect:
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
-                                          "files", "madd", "zeros", "read") if key in table}
+                                          "files", "madd", "zeros", "read", "words", "caseless") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
                    parts=Parts(**table["parts"]) if "parts" in table else None,
                    call=Call(**table["call"]) if "call" in table else None)
@@ -154,7 +179,7 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
     if "call" in table:
         call = table["call"]
         faults += [f"call.{key} is missing" for key in CALL if key not in call]
-        faults += [f"call.{key} is not known" for key in call if key not in (*CALL, "argument")]
+        faults += [f"call.{key} is not known" for key in call if key not in (*CALL, "argument", "continued")]
         trials += [("call.argument", call["argument"], {"value": "a"}) for _ in range("argument" in call)]
         take = {"name": "r", "function": "f", "sizes": "1, ", "arguments": "a", "n_in": 1, "n_out": 1, "code": 1}
         trials += [(f"call.{key}", call[key], take if key == "take" else {"name": "r", "k": 0}) for key in CALL if key in call]

@@ -117,7 +117,10 @@ class Rows:
         if rule is None:
             return
         values = tuple(self.number(a) for a in node.args)
-        for a, partial in zip(node.args, rule(Slopes, self.of[node], values)):
+        result = self.of[node]
+        if node.op == "sqrt":  # an exact 1/2 is divided by each root on its own, which raises for zero
+            result = np.maximum(result, np.finfo(float).tiny)
+        for a, partial in zip(node.args, rule(Slopes, result, values)):
             if isinstance(a, Node):
                 passed = np.nan_to_num(np.asarray(mine * partial, dtype=float))
                 weight[a] = weight.get(a, 0.0) + passed

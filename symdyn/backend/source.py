@@ -32,7 +32,7 @@ from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
 from symdyn.backend.user_functions import texts as texts_of_user_functions
-from symdyn.errors import SymdynError
+from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.folders import templates_folder
 from symdyn.shown import shown
 from symdyn.tape.algorithms import text_of
@@ -49,6 +49,9 @@ VIOLATION = "violation"
 EVENTS = "events"
 # The file of symdyn/tape/algorithms that an algorithm is in.
 _TEXTS = {"symdyn_saddle": "saddle", "symdyn_multipliers": "saddle", "symdyn_cube": "cube", "symdyn_catenary": "catenary"}
+# What calls an algorithm.
+_CALLED_BY = {**dict.fromkeys(("symdyn_saddle", "symdyn_multipliers"), "constraints"), "symdyn_cube": "sd.Buoyancy",
+              "symdyn_catenary": "sd.MooringLine"}
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -160,6 +163,13 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     for template, target in wanted.items():
         try:
             text = environment.get_template(f"{backend}/{template}").render(context)
+        except jinja2.TemplateNotFound as error:
+            algorithm = Path(str(error.name)).name.partition(".")[0]
+            if algorithm not in _TEXTS:
+                raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
+            raise UnsupportedExpression(
+                f"{content.name} calls the numeric algorithm {algorithm}, by {_CALLED_BY[algorithm]}, and the templates of "
+                f"{backend} have no text of it; take C or NumPy, model the load by expressions, or add {error.name}") from None
         except (jinja2.TemplateError, TypeError, ValueError, LookupError, AttributeError) as error:
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         if backend == "c":

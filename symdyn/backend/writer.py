@@ -46,7 +46,7 @@ class Writer:
         self.codes = codes
         self.names = tape.recorder.names
         self.checks: Mapping[Node, str] = {}
-        self.taken: set[str] = set()
+        self.taken: set[str] = dialect.names()
         self.text: dict[Node, str] = {}
         self.printer = Printer(dialect, self.text)
         self.uses: Counter[Node] = Counter()
@@ -227,6 +227,7 @@ class Writer:
         self.text[node] = identifier(f"{kernel.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
         written = [way.argument.format(value=self.printer.text(v)) for v in values]
         arguments = fill(", ".join(written), 116, subsequent_indent="    ", break_long_words=False)
+        arguments = arguments.replace("\n", f"{way.continued}\n")
         return way.take.format(name=self.text[node], function=kernel.name, sizes="".join(f"{size}, " for size in kernel.sizes),
                                arguments=arguments, n_in=len(values), n_out=kernel.n_out,
                                code=self.codes[self.checks[node]]).strip().split("\n")

@@ -1,4 +1,4 @@
-"""`symdyn export`: a mechanism for other libraries."""
+"""`symdyn export`: a mechanism for other libraries and languages."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from symdyn.cli.messages import WRONG, Stop
 # Option -> the library, and what is written.
 LIBRARIES = {"casadi": "casadi.Function objects: NAME_casadi.py", "jax": "functions for jit, vmap, grad: NAME_jax.py",
              "torch": "functions for PyTorch: NAME_torch.py"}
+LANGUAGES = {"fortran": "a module of Fortran 2008: NAME.f90", "julia": "a module of Julia: NAME.jl",
+             "matlab": "a function of MATLAB and Octave: NAME.m", "rust": "a module of Rust: NAME.rs"}
+TARGETS = {**LIBRARIES, **LANGUAGES}
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a file for every library that was asked for, an FMU, a CMake package."""
-    wanted = [target for target in LIBRARIES if getattr(arguments, target)]
+    """Write files for every library and language that was asked for, an FMU, a CMake package."""
+    wanted = [target for target in TARGETS if getattr(arguments, target)]
     if not wanted and not arguments.fmu and not arguments.cmake:
-        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*LIBRARIES, 'fmu', 'cmake'))}", WRONG)
-    from symdyn.pipeline import write_source
+        raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*TARGETS, 'fmu', 'cmake'))}", WRONG)
+    from symdyn.pipeline import emit, write_source
     from symdyn.targets.text import source_for
 
     equations = find_equations(arguments)
@@ -30,7 +33,8 @@ def export(arguments: argparse.Namespace) -> int:
         for path in equations.to_cmake(arguments.output or Path("generated") / equations.name, arguments.jacobians):
             print(f"wrote {path}")
     for target in wanted:
-        source = source_for(equations, target, arguments.functions)
+        source = (emit(equations, target, arguments.functions) if target in LANGUAGES else
+                  source_for(equations, target, arguments.functions))
         for path in write_source(source, arguments.output or Path("generated") / source.metadata.name):
             print(f"wrote {path}")
     return 0
@@ -38,7 +42,7 @@ def export(arguments: argparse.Namespace) -> int:
 
 def add_export(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
-    for target, text in LIBRARIES.items():
+    for target, text in TARGETS.items():
         parser.add_argument(f"--{target}", action="store_true", help=f"{text}; it needs symdyn no more")
     parser.add_argument("--fmu", action="store_true", help="an FMU for programs that import FMI, with its sources: NAME.fmu")
     parser.add_argument("--fmi", type=int, choices=(3, 2), default=3, help="version of FMI (default: 3)")

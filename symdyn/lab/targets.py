@@ -1,4 +1,5 @@
-"""How far functions for CasADi, JAX and PyTorch agree with the C module: python -m symdyn.lab.targets --library jax"""
+"""How far functions for CasADi, JAX and PyTorch, and files in other languages, agree with the C module:
+python -m symdyn.lab.targets --library jax, or --language rust"""
 
 from __future__ import annotations
 
@@ -11,7 +12,9 @@ from typing import Any
 import numpy as np
 
 import symdyn as sd
+from symdyn.errors import UnsupportedExpression
 from symdyn.formulation.equations import Equations
+from symdyn.lab.languages import PROGRAMS, evaluated
 
 STATES = 1000
 
@@ -38,6 +41,8 @@ def compared(name: str, way: str, dtype: str, through: str = "xla") -> tuple[np.
 
 
 def _evaluated(equations: Equations, way: str, dtype: str, through: str) -> Callable[..., np.ndarray]:
+    if way in PROGRAMS:
+        return evaluated(equations, way)
     if way == "casadi":
         f = equations.to_casadi("rhs")
         return lambda t, x, p, inputs: f.map(STATES)(t, x.T, np.tile(p[:, None], STATES), inputs.T).full().T
@@ -54,12 +59,17 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Print a line for each mechanism of the catalogue."""
     parser = argparse.ArgumentParser(prog="python -m symdyn.lab.targets")
     parser.add_argument("--library", choices=("casadi", "jax", "torch"), default="casadi")
+    parser.add_argument("--language", choices=tuple(PROGRAMS), help="files in a language in place of a library")
     parser.add_argument("--dtype", choices=("float64", "float32"), default="float64")
     parser.add_argument("--through", choices=("xla", "c"), default="xla")
     parser.add_argument("names", nargs="*", default=sd.systems.names())
     chosen = parser.parse_args(arguments)
     for name in chosen.names:
-        errors, apart = compared(name, chosen.library, chosen.dtype, chosen.through)
+        try:
+            errors, apart = compared(name, chosen.language or chosen.library, chosen.dtype, chosen.through)
+        except UnsupportedExpression as error:
+            print(f"{name:36} {error}")
+            continue
         print(f"{name:36} largest {errors.max():.1e}  median {np.median(errors):.1e}  states with one result only {apart}")
 
 

@@ -1,0 +1,128 @@
+"""Files in Fortran, Julia, MATLAB and Rust: compiled or interpreted, they give their reference vectors, and what C gives."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.backend.dialect import Caseless, identifier
+from symdyn.cli import main
+from symdyn.errors import UnsupportedExpression
+from symdyn.lab.languages import PROGRAMS, built, program_for
+from symdyn.lab.targets import compared
+from symdyn.pipeline import emit, write_source
+
+needed = {language: pytest.mark.skipif(program_for(language) is None, reason=f"there is no {program}")
+          for language, program in PROGRAMS.items()}
+LANGUAGES = [pytest.param(language, marks=mark) for language, mark in needed.items()]
+WORDS = ("fortran", "julia", "matlab", "rust")
+
+
+def strange() -> sd.System:
+    """All operations, symbols whose names differ in capitals alone or are words of a language."""
+    q, Q = sd.coordinates("q Q")
+    m, M, e, block, fn, end = sd.parameters("m M e block fn end")
+    F = sd.inputs("F")
+    system = sd.System("strange", gravity=[0, -9.81])
+    a = system.add_body("a", mass=m, inertia=1)
+    b = system.add_body("b", mass=M, inertia=1, com=[0.3, 0])
+    system.add_joint(sd.Prismatic("slide", system.ground, a, q, axis=[1, 0]))
+    system.add_joint(sd.Revolute("turn", a, b, Q))
+    x = q / 4
+    unary = [sp.tan(x), sp.asin(x), sp.acos(x), sp.atan(x), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.asinh(x), sp.acosh(x + 3),
+             sp.atanh(x), sp.exp(x), sp.log(x + 3), sp.Abs(x), sp.sign(x), sp.floor(7 * x), sp.ceiling(7 * x), sp.erf(x),
+             sp.Min(x, Q), sp.Max(x, Q), sp.atan2(x, Q), (x + 3) ** sp.Rational(7, 3), sp.sqrt(x + 3), sp.Heaviside(x)]
+    several = sp.Piecewise((e, (x < Q) & (Q > 0)), (block, sp.Or(sp.Eq(x, Q), x >= Q)), (fn, sp.Ne(x, 1) & (x >= 0)), (end, True))
+    system.add_output("values", [*unary, several, F * sp.cos(sd.t)])
+    system.add_force(a, [F, 0])
+    return system.set_defaults({m: 1.0, M: 2.0, e: 0.5, block: 1.5, fn: 2.5, end: 3.5})
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", ["strange", "two_link_arm", "bricard"])
+def test_all_functions_give_their_reference_vectors(name: str, language: str, tmp_path: Path) -> None:
+    system = strange() if name == "strange" else sd.systems.get(name)
+    equations = system.augmented() if system.loops else system.embedding()
+    functions = None if name != "strange" else ["rhs", "mass_matrix", "outputs", "jacobian_x"]
+    source = emit(equations, language, functions)
+    write_source(source, tmp_path)
+    command = built(language, tmp_path, source.metadata.name)
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert found.returncode == 0 and "all results agree" in found.stdout, found.stdout + found.stderr
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_wrong_result_is_found(language: str, tmp_path: Path) -> None:
+    source = emit(sd.systems.pendulum().embedding(), language, ["rhs"])
+    write_source(source, tmp_path)
+    path = tmp_path / next(iter(source.files))
+    text = path.read_text()
+    assert "sin" in text
+    path.write_text(text.replace("sin(", "cos("))
+    found = subprocess.run(built(language, tmp_path, "pendulum"), cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert found.returncode != 0 and "rhs: wrong" in found.stdout
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", ["cart_pole", "slider_crank"])
+def test_random_states_agree_with_c(name: str, language: str) -> None:
+    errors, apart = compared(name, language, "float64")
+    assert len(errors) == 1000 and apart == 0
+    assert np.median(errors) < 1e-15 and errors.max() < 1e-13  # 1e-16 times what the state's condition makes of it
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_value_that_must_be_positive_and_is_not(language: str, tmp_path: Path) -> None:
+    system = sd.systems.pendulum()
+    system.defaults = {k: 0.0 if str(k) == "m" else v for k, v in system.defaults.items()}
+    source = emit(system.embedding(), language, ["rhs"])
+    write_source(source, tmp_path)
+    command = built(language, tmp_path, "pendulum")
+    if language == "matlab":
+        command = [*command[:-1], "pendulum('rhs', 0, [0; 0])"]
+        found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        assert "mass matrix" in found.stderr
+        return
+    found = subprocess.run([*command, "rhs"], cwd=tmp_path, input="0 0 0\n", capture_output=True, text=True, timeout=60)
+    assert found.stdout.lower().split() == ["nan", "nan"]
+
+
+def test_julia_has_no_fault_of_syntax() -> None:
+    tree_sitter, grammar = pytest.importorskip("tree_sitter"), pytest.importorskip("tree_sitter_julia")
+    parser = tree_sitter.Parser(tree_sitter.Language(grammar.language()))
+    for equations in (strange().embedding(), sd.systems.get("bricard").augmented()):
+        for name, text in emit(equations, "julia").files.items():
+            assert not parser.parse(text.encode()).root_node.has_error, name
+    assert parser.parse(b"function f(x)\n x +* 2\nend\n").root_node.has_error
+
+
+@pytest.mark.parametrize("language", WORDS)
+def test_what_a_language_has_no_text_of_is_named(language: str) -> None:
+    with pytest.raises(UnsupportedExpression, match=rf"floating_crane calls the numeric algorithm symdyn_c\w+, by sd\.\w+, and "
+                       rf"the templates of {language} have no text of it; take C or NumPy"):
+        emit(sd.systems.floating_crane().embedding(), language, ["rhs"])
+    system = sd.systems.pendulum()
+    text = "static int square(const double *in, double *out) { out[0] = in[0]*in[0]; return 0; }"
+    system.add_torque("bob", sd.External("square", ["x"], c=text)(sd.t))
+    with pytest.raises(sd.SymdynError, match=rf"square.*{language}"):
+        emit(system.embedding(), language, ["rhs"])
+
+
+def test_names_that_differ_in_capitals_alone() -> None:
+    taken = Caseless(["Block"])
+    assert [identifier(name, taken) for name in ("m", "M", "block")] == ["m", "M_", "block_"]
+
+
+def test_the_command_writes_every_language(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "pendulum", *(f"--{word}" for word in WORDS), "--functions", "rhs", "--output", str(tmp_path)]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "pendulum.f90", "pendulum.jl", "pendulum.m", "pendulum.rs", "pendulum_main.f90", "pendulum_main.jl", "pendulum_main.rs",
+        "pendulum_selftest.m"]
+    assert main(["export", "pendulum"]) == 2 and "--rust" in capsys.readouterr().err
+    assert main(["export", "floating_crane", "--rust", "--functions", "rhs"]) != 0
+    assert "no text of it; take C or NumPy" in capsys.readouterr().err
