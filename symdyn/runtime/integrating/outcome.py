@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +64,7 @@ class Impact(NamedTuple):
     impulses: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    rest: Mapping[int, float] = MappingProxyType({})
+    rest: Mapping[int, float] = {}
 
 
 @dataclass(frozen=True)
