@@ -556,3 +556,24 @@ def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["--version"])
     assert stop.value.code == 0 and capsys.readouterr().out == f"symdyn {symdyn.__version__}\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit) as ended:
+        main(["--print-completion", shell])
+    text = capsys.readouterr().out
+    assert ended.value.code == 0 and "simulate" in text and "rtol" in text
+
+
+def test_completion_without_shtab_or_of_another_shell(capsys: pytest.CaptureFixture[str],
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit):
+        main(["--print-completion", "cmd"])
+    assert "--print-completion: there is no shell 'cmd'; there are bash" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    with pytest.raises(SystemExit):
+        main(["--print-completion", "bash"])
+    assert "--print-completion needs the package shtab: pip install 'symdyn[completion]'" in capsys.readouterr().err

@@ -38,11 +38,28 @@ class _Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(None, f"there is no command {value!r}; {hint}")
 
 
+class _Completion(argparse.Action):
+    """Prints the completion of a shell, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
+        try:
+            import shtab
+        except ImportError:
+            parser.error("--print-completion needs the package shtab: pip install 'symdyn[completion]'")
+        if values not in shtab.SUPPORTED_SHELLS:
+            parser.error(f"--print-completion: there is no shell {values!r}; there are {', '.join(shtab.SUPPORTED_SHELLS)}")
+        print(shtab.complete(parser, values))
+        parser.exit()
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser; what it returns holds the function of the command as `run`."""
     parser = _Parser(prog="symdyn", description="Equations of motion of multibody systems: derived "
                      "symbolically, generated as C and NumPy, simulated fast.")
     parser.add_argument("--version", action="version", version=f"symdyn {symdyn.__version__}")
+    parser.add_argument("--print-completion", action=_Completion, metavar="SHELL", help="print what a shell completes commands "
+                        "and options by: bash, zsh, tcsh (needs shtab)")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=argparse.ArgumentParser)
 
     def command(name: str, run: Callable[[argparse.Namespace], int], text: str, system: bool = True) -> Any:
