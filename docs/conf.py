@@ -15,7 +15,7 @@ author = "the symdyn developers"
 release = version = symdyn.__version__
 html_title = f"symdyn {version}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "mathml", "outside"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "outside"]
 exclude_patterns = ["extensions"]
 root_doc = "index"
 
@@ -32,7 +32,7 @@ suppress_warnings = ["ref.python"]  # a class called like another: the type in a
 toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"
-html_static_path = ["static"]
+html_static_path = ["static", "../generated/gallery"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False

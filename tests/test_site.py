@@ -18,8 +18,8 @@ from tests.helpers import browser
 ROOT = Path(__file__).parents[1]
 # As wide as a screen, and as a telephone.
 WIDTHS = 1280, 400
-PAGES = ("index", "describing_mechanisms", "printing", "measured", "reference/system", "reference/module", "contributing",
-         "genindex")
+PAGES = ("index", "describing_mechanisms", "printing", "measured", "gallery", "gallery/puma560", "gallery/bicycle",
+         "reference/system", "reference/module", "contributing", "genindex")
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +74,40 @@ def test_pages_work_without_a_network(site: Path, shown: Any, name: str) -> None
         page.goto((site / f"{name}.html").as_uri())
         assert all(url.startswith(("file:", "data:")) for url in asked) and not said, (asked, said)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.close()
+
+
+def test_the_gallery_shows_every_mechanism(site: Path, shown: Any) -> None:
+    """A picture of each in the grid, and a page with its equations and numbers."""
+    page = shown.new_page()
+    page.goto((site / "gallery.html").as_uri())
+    for image in page.query_selector_all(".gallery img"):
+        image.scroll_into_view_if_needed()
+        page.wait_for_function("image => image.complete && image.naturalWidth > 0", arg=image, timeout=10_000)
+    links = page.eval_on_selector_all(".gallery a", "links => links.map(link => link.getAttribute('href'))")
+    assert links == [f"gallery/{name}.html" for name in sd.systems.names()]
+    page.close()
+    for name in sd.systems.names():
+        text = (site / "gallery" / f"{name}.html").read_text(encoding="utf-8")
+        assert '<div class="formula"><math' in text and "<td><p>rhs</p></td>" in text and "x_dot" in text, name
+        assert (site / "_static" / f"{name}.c").stat().st_size > 1000 and f"_static/{name}.html#play" in text, name
+
+
+@pytest.mark.parametrize("name", ["four_bar", "puma560"])
+def test_mechanisms_of_the_gallery_move(site: Path, shown: Any, name: str) -> None:
+    """The embedded page plays without a click, unless the reader asked for reduced motion."""
+    for motion, moves in (("no-preference", True), ("reduce", False)):
+        page = shown.new_page(reduced_motion=motion)
+        page.goto((site / "gallery" / f"{name}.html").as_uri())
+        page.query_selector("iframe.view").scroll_into_view_if_needed()
+        view = page.query_selector("iframe.view").content_frame()
+        view.wait_for_selector("#player input", timeout=20_000)
+        time = "Number(document.querySelector('#player input').value)"
+        if moves:
+            view.wait_for_function(f"{time} > 0.1", timeout=20_000)
+        else:
+            page.wait_for_timeout(500)
+            assert view.evaluate(time) == 0
         page.close()
 
 

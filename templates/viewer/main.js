@@ -166,6 +166,8 @@ function playControls(parent, below, stage, scenes, say) {
         }
     });
     seek(first);
+    // A page that embeds this one may ask for a picture that moves at once.
+    if (location.hash === "#play" && !matchMedia("(prefers-reduced-motion: reduce)").matches) go();
 }
 
 // Names of bodies and joints over the picture.
