@@ -12,7 +12,7 @@
 # # A bicycle and its weave
 #
 # A bicycle that nobody steers falls over at low speed, weaves at a somewhat higher one, steers itself at 5 m/s, and
-# falls slowly at a high one. The equations that say so were published with benchmark numbers by Meijaard, Papadopoulos,
+# falls slowly at a high one. The equations that predict this were published with benchmark numbers by Meijaard, Papadopoulos,
 # Ruina and Schwab (Proceedings of the Royal Society A 463, 2007). This notebook finds them from a model of four rigid
 # bodies whose wheels roll.
 

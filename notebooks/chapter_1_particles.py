@@ -179,7 +179,7 @@ display(sp.simplify(parts.total - sd.rate(sd.rate(P.position(of=n)))).T)
 # %% [markdown]
 # ## 6. The slides, formula by formula
 #
-# All derivations of the chapter, typed from the slides, beside what follows from frames. Where a slide is wrong, a proof that
+# All derivations of the chapter, typed from the slides, next to what follows from frames. Where a slide is wrong, a proof that
 # does not use the formula shows it.
 
 # %%

@@ -12,7 +12,7 @@
 # # One rigid body
 #
 # Chapter 2 of the lecture goes from two particles to the equations of motion of a rigid body. Its steps with particles and
-# frames: moment equation, inertia, Euler angles; a body that tumbles; then every derivation of the chapter beside its slide.
+# frames: moment equation, inertia, Euler angles; a body that tumbles; then every derivation of the chapter next to its slide.
 
 # %%
 import matplotlib.pyplot as plt
@@ -124,7 +124,7 @@ assert abs(n_momentum - n_momentum[0]).max() < 1e-8
 # %% [markdown]
 # ## 5. The slides, formula by formula
 #
-# All derivations of the chapter, typed from the slides, beside what follows from frames and bodies. Two slides are wrong: an
+# All derivations of the chapter, typed from the slides, next to what follows from frames and bodies. Two slides are wrong: an
 # index, which changes the result, and the sense of an angular velocity, which does not.
 
 # %%

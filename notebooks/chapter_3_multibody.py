@@ -13,8 +13,8 @@
 #
 # The lecture's chapter 3 derives the motion of constrained bodies in two ways. The embedding technique writes the position as
 # a function of independent coordinates, so that the reaction never appears. The augmented formulation keeps the Cartesian
-# coordinates, adds the constraint as an equation, and finds the reaction as $-\mathbf C_r^T \lambda$. Here both are set beside
-# each other, and beside the slides. (The embedding technique step by step: see `vehicle_on_rotating_track`.)
+# coordinates, adds the constraint as an equation, and finds the reaction as $-\mathbf C_r^T \lambda$. Here both are compared with
+# each other, and with the slides. (The embedding technique step by step: see `vehicle_on_rotating_track`.)
 
 # %%
 import matplotlib.pyplot as plt
@@ -63,7 +63,7 @@ display(Math(rf"\mathbf C_r = {latex(pendulum.C_r)} \qquad F^d = {latex(pendulum
 
 # %% [markdown]
 # The slides have $F^d = 0$ here: they note that $\mathbf C_r \dot{\mathbf r} = 2 x \dot x + 2 y \dot y$ vanishes in every motion
-# along the circle, and then differentiate the zero. But the derivative by $\mathbf r$ compares points beside the circle, where
+# along the circle, and then differentiate the zero. But the derivative by $\mathbf r$ compares points off the circle, where
 # the product does not vanish. The comparison finds it, entry by entry, with a proof that does not use the formula itself.
 
 # %%
@@ -213,7 +213,7 @@ assert virtual == 0
 assert power != 0
 
 # %% [markdown]
-# ## 5. The chapter beside its slides
+# ## 5. The chapter compared with its slides
 #
 # Every derivation of chapters 3.1 to 3.5, entry by entry. An entry is called wrong only where an independent proof shows it: a
 # limit, an energy balance, numeric differentiation or another formulation.

@@ -243,7 +243,7 @@ print(f"error of R: {abs(rotation.from_parameters(rotation.normalized(end)) - ro
 # %% [markdown]
 # ## 7. The slides, formula by formula
 #
-# All derivations of the chapter, typed from the slides, beside what follows from rotations, frames and the equations of the two
+# All derivations of the chapter, typed from the slides, next to what follows from rotations, frames and the equations of the two
 # arms. Where a slide is wrong, a proof that does not use the formula shows it.
 
 # %%

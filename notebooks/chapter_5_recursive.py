@@ -174,7 +174,7 @@ show(r"M_{O_1}\text{, right}", sp.factor((X.T * push)[2]))
 show(r"M_{O_1}\text{, as printed}", sp.factor((misprinted.T * push)[2]))
 
 # %% [markdown]
-# ## 6. The chapter beside its slides
+# ## 6. The chapter compared with its slides
 #
 # Every derivation of chapters 5.1 to 5.8, entry by entry. An entry is called wrong only where an independent proof shows it:
 # numeric differentiation, Lagrange's equation, a limit, units.

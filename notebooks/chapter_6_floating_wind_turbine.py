@@ -358,7 +358,7 @@ for mode in floating.linearize(rest.x).modes():
 # %% [markdown]
 # ### What changes a period
 #
-# The derivative of a frequency by any parameter is exact, and counts that the equilibrium moves with it. Beside it stands the
+# The derivative of a frequency by any parameter is exact, and counts that the equilibrium moves with it. Next to it stands the
 # difference quotient of two equilibria and their modes.
 
 # %%
@@ -439,7 +439,7 @@ for a in axes.flat:
 plt.show()
 
 # %% [markdown]
-# The start-up shows two things beside the rotor. The wind takes the platform along and lets it pitch. The generator's torque
+# The start-up shows two things besides the rotor. The wind takes the platform along and lets it pitch. The generator's torque
 # goes from the rotor through the tower to the platform, which rolls a little. In the thrust step the pitch overshoots within
 # seconds, the surge within a minute.
 
@@ -635,7 +635,7 @@ print(f"ballast moved: {upright['m_x'] / 1000:.1f} t; by moments 2 m_x y_b = m_c
 # %% [markdown]
 # ## 11. The slides, formula by formula
 #
-# `sd.compare("6")` puts all derivations of the chapter beside what follows from bodies and joints. Here are two that have
+# `sd.compare("6")` compares all derivations of the chapter with what follows from bodies and joints. Here are two that have
 # errors; an entry is called wrong only where an independent proof shows it.
 
 # %%

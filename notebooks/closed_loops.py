@@ -197,7 +197,7 @@ print("rows:", ", ".join(module.metadata.constraints))
 # %% [markdown]
 # ### Consistent states
 #
-# A simulation must start on the constraints. From a state that does not fulfil them it says so instead of guessing what was
+# A simulation must start on the constraints. From a state that does not fulfil them it raises instead of guessing what was
 # meant. `consistent` finds the nearest state that does. Of the two ways to put the linkage together the guess decides, and
 # `keep` holds what must stay: here the angle of the crank.
 
@@ -332,7 +332,7 @@ for system in (linkage, sd.systems.andrews_squeezer()):
 # ## 6. Andrews' squeezing mechanism
 #
 # Seven bodies, three loops, six constraints, and a motion of milliseconds: the classic test of programs for closed loops. The
-# crank turns two and a half times in 0.03 s. Here are its seven angles then, beside the published ones.
+# crank turns two and a half times in 0.03 s. Here are its seven angles then, compared with the published ones.
 
 # %%
 squeezer = sd.systems.andrews_squeezer().augmented().compile()

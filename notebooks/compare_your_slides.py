@@ -122,7 +122,7 @@ print(found)
 # | `other(sentence, value)` | another formulation gives the same |
 # | `Proof(kind, sentence, residual)` | anything else that vanishes |
 #
-# An erratum whose proof does not hold leaves the entry *different*, and one about an entry that is right is refused.
+# An erratum whose proof does not hold leaves the entry *different*, and one about an entry that is right is rejected.
 
 # %% [markdown]
 # ## 5. Reports

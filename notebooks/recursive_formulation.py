@@ -220,7 +220,7 @@ assert vanishes(one.p + two.X_star * (two.p_A + two.I_A * two.c + moved * u2 / i
 # $$\ddot q_i = \frac{\tau_i - \mathbf S_i^T \left( \mathbf I_i^A (\mathbf X_i \mathbf a_{i-1} + \mathbf c_i) +
 # \mathbf p_i^A \right)}{\mathbf S_i^T \mathbf I_i^A \mathbf S_i}$$
 #
-# Here are these formulas in numbers, at one state, beside the embedding technique.
+# Here are these formulas in numbers, at one state, compared with the embedding technique.
 
 # %%
 place, speed, torque = [0.3, 0.6], [1.0, -2.0], [1.5, -0.5]

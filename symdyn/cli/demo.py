@@ -51,7 +51,7 @@ def _loaded(module: Module) -> str:
 
 
 class _Stage:
-    """Tells the name of a stage before it, and its time after it."""
+    """Prints the name of a stage before it, and its time after it."""
 
     def __init__(self, name: str) -> None:
         self.name = name

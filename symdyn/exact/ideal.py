@@ -1,4 +1,4 @@
-"""What polynomials become where others are zero: constraints as relations, beside those of sines, cosines and roots.
+"""What polynomials become where others are zero: constraints as relations, in addition to those of sines, cosines and roots.
 
 A polynomial that multiples of the relations add up to vanishes wherever they do: division leaves no rest. By the relations
 themselves that depends on their order; by a Groebner basis none is left exactly where there are such multiples. The basis is

@@ -273,7 +273,7 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     columns        of the matrix that the pairs are the entries of, row by row; 0: scalars
     unit_vectors   groups of leaves whose squares add up to one
     bound          terms that a product may have
-    relations      nodes that are zero where the claim is made; nonzero: symbols in them that are not zero, beside those that are
+    relations      nodes that are zero where the claim is made; nonzero: symbols in them that are not zero, besides those that are
                    assumed to be so
     """
     def index(k: int) -> tuple[int, ...] | None:

@@ -76,7 +76,7 @@ class Letters:
         return self._series[own]
 
     def partner(self, x: int, y: int) -> Partner | None:
-        """Letters that stand beside x and y in the other term of a theorem of sums, and what both are with letters and sign, for
+        """Letters that stand next to x and y in the other term of a theorem of sums, and what both are with letters and sign, for
         the same number and the opposite; None where there is no such theorem."""
         if (x, y) not in self._partners:
             self._partners[x, y] = _partner(x, y, self)

@@ -43,7 +43,7 @@ def rotation() -> list[Formula]:
 
 
 def angular_velocity() -> list[Formula]:
-    """From the sum of simple rotations to nG, beside the angular velocity of a frame with these angles."""
+    """From the sum of simple rotations to nG, compared with the angular velocity of a frame with these angles."""
     turning = sd.coordinates("phi theta psi")
     omega = sd.Frame("n").frame("b", rotation=sd.rotation.from_euler("XYZ", turning)).angular_velocity()
     by_G = sd.rotation.euler_rates("XYZ", angles, frame="n")

@@ -159,7 +159,7 @@ def at_joint() -> list[Formula]:
 
 
 def torque() -> list[Formula]:
-    """The torque of joint 2, beside what the embedding technique gives for the same arm in space."""
+    """The torque of joint 2, compared with what the embedding technique gives for the same arm in space."""
     arm = arm_in_space()
     f = arm.of_link2("f")
     k, S = arm.vector("b2_k_b2", arm.of_link2("S")[:3]), arm.of_link2("S")

@@ -19,7 +19,7 @@ class EulerAngles:
     The angles are the coordinates, in the order of the sequence.
     speeds   "rates": the derivatives of the angles; "body": the angular velocity, rad/s, in the axes of the joint frame on
              the child. With "body" the mass matrix is regular at every attitude; it is the angles' rates that do not exist
-             at gimbal lock, and a run that gets there stops and says so.
+             at gimbal lock, and a run that gets there stops with a message.
     Raises ModelError for anything but one of the twelve sequences and these two.
 
     >>> system = sd.System("top")

@@ -1,7 +1,7 @@
 """The whole report of a mechanism as one page that needs no network: equations, what they cost, how well they are determined
 along a motion, work against error, stress.
 
-A part that cannot be made becomes a paragraph that says so; the page is written all the same.
+A part that cannot be made becomes a paragraph that reports it; the page is written all the same.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rigid contacts in one mode, for linear equations and states of rest: what closed contacts hold, and parameters that say so."""
+"""Rigid contacts in one mode, for linear equations and states of rest: what closed contacts hold, and their parameters."""
 
 from __future__ import annotations
 

@@ -288,7 +288,7 @@ class Measured:
 
 
 def compilers() -> list[Compiler]:
-    """The usual compiler, and a clang or the one of the package ziglang beside it where there is one."""
+    """The usual compiler, and a clang or the one of the package ziglang next to it where there is one."""
     usual = find_compiler()
     if usual is None:
         return []

@@ -1,4 +1,4 @@
-"""Tapes as generated code runs them, statement by statement: numeric algorithms written out, other equations beside."""
+"""Tapes as generated code runs them, statement by statement: numeric algorithms written out, other equations besides."""
 
 from __future__ import annotations
 

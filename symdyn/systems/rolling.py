@@ -75,7 +75,7 @@ def sleigh() -> System:
 
     x, y (m) is the point where the knife edge touches the plane, theta (rad) the direction of the edge, counterclockwise. The
     centre of mass is a ahead of this point; the force -k times its distance from the line acts on it. Planar, no gravity in the
-    plane. The constraint is -x_dot sin theta + y_dot cos theta = 0. It starts at 1 m/s along the line, 0.01 m beside it.
+    plane. The constraint is -x_dot sin theta + y_dot cos theta = 0. It starts at 1 m/s along the line, 0.01 m next to it.
 
     Outputs: track, centre, distances of the edge and of the centre of mass from the line (m). Input: T, a moment about the
     vertical (N m).

@@ -40,14 +40,14 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state, or the nearest
                    one that fulfils its constraints; a motion that stands still is reported
     repeats        timed runs of a row, of which the least time is compared; of very short ones up to eight times as many
-    against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn",
+    against        other programs to compare with: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn",
                    or "all" of these
     budget         s after which no further run is begun; derivation, compilation and the reference count, which is given a third
                    to two thirds of it, but a run or a compilation that has begun is brought to its end. Other programs have
                    processes of their own then, on Linux; preparing counts, and is ended, and reported, where it takes too long
                    of what is left
     folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed again
-                   at the end if there is time for that, else the rows say so; rows that are not asked for stay in the file for
+                   at the end if there is time for that, else the rows report it; rows that are not asked for stay in the file for
                    a later run
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s; runs that end there are timed alone

@@ -1,4 +1,4 @@
-"""What a scene does not need and therefore does not get, in sentences: read off the tape, not remembered beside it."""
+"""What a scene does not need and therefore does not get, in sentences: read off the tape, not kept apart from it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Ranks:
     """rank: the largest found, of the scaled C_r; independent: rows that have it, far from losing it at all states.
 
     samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
-    vanishing   rows whose derivatives vanish at all these states, but not beside them
+    vanishing   rows whose derivatives vanish at all these states, but not next to them
     """
 
     rank: int
@@ -99,7 +99,7 @@ def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) ->
 
 
 def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
-    """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those beside them."""
+    """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those next to them."""
     here = np.abs(states.at(places)["C_r"]).max(axis=(0, 2), initial=0.0)
     beside = np.abs(states.at(places + stream.uniform(-0.5, 0.5, places.shape))["C_r"]).max(axis=2, initial=0.0)
     beside = np.where(np.isfinite(beside), beside, 0.0).max(axis=0, initial=0.0)

@@ -1,7 +1,7 @@
 """Which columns of a matrix are independent at every state, tried at random states in double precision.
 
 A matrix whose entries are analytic in the state has the same dependencies between its columns at almost every state, so a
-few random ones show them. Columns are scaled to length one; what a column has left beside those before it is either of
+few random ones show them. Columns are scaled to length one; what a column has left in addition to those before it is either of
 the order of rounding, or far above it, and the gap between is reported.
 Source: Gautier, Numerical calculation of the base inertial parameters of robots (1991); Golub and Van Loan, Matrix
 Computations, section 5.2 (Gram-Schmidt, each step taken twice).

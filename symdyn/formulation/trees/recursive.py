@@ -104,7 +104,7 @@ class RecursiveTree(TreeQuantities):
     """A tree whose accelerations come from articulated bodies.
 
     Joints that share a speed (gears) cannot be released one by one: a tree with such joints keeps the mass matrix by
-    composite bodies, and says so.
+    composite bodies, and reports it.
     """
 
     def __init__(self, tree: Tree) -> None:

@@ -37,7 +37,7 @@ class LinearStiffness(Element):
     K           (6, 6): N/m, N, N m, N m/rad; a list of 6 stands for its diagonal
     force       (6,) at the reference: N, N m; point: (3,) body axes, m; reference: (6,) m, rad
     angles      "ZYX": roll, pitch, yaw of R = R_z(psi) R_y(theta) R_x(phi), along whose rates the moments act; singular at a
-                pitch of 90 degrees, where the run stops and says so
+                pitch of 90 degrees, where the run stops with a message
                 "rotation vector": axis times angle, without singularity below half a turn, where it jumps to the opposite
                 "auto": "ZYX" for a body whose joint with the ground has these angles, also through bodies that are fixed to
                 each other, else the rotation vector; in absolute coordinates as the joints of the tree have it

@@ -22,7 +22,7 @@ PRIVATE = 0o600
 
 
 def write_whole(path: Path, fill: Callable[[IO[bytes]], object], mode: int = 0o666, sync: bool = True) -> None:
-    """Write a file beside its final name and move it there in one step: whoever sees the name sees a whole file.
+    """Write a file next to its final name and move it there in one step: whoever sees the name sees a whole file.
 
     fill   writes the content; mode: permissions, less the umask; sync: wait until the content is on the disk
     Each process and thread writes to a scratch file of its own. Raises OSError as the disk does; then nothing is left of it.

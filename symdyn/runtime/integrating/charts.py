@@ -1,4 +1,4 @@
-"""Euler angles near gimbal lock: runs that came so near that rounding errors of their rates count say so."""
+"""Euler angles near gimbal lock: runs that came so near that rounding errors of their rates count warn."""
 
 from __future__ import annotations
 

@@ -208,7 +208,7 @@ def modes_of(stepped: Stepped, n: int) -> np.ndarray:
 
 
 def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Phase], np.ndarray]:
-    """The modes of all contacts, and the parameters that say so, of the step before every row; of the first row that after it."""
+    """The modes of all contacts, and their parameters, of the step before every row; of the first row that after it."""
     records, names = module.metadata.contacts, module.metadata.parameters
     n = len(records)
     steps = np.maximum(stepped.row - 1, 0)

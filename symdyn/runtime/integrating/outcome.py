@@ -49,7 +49,7 @@ class Stepped:
 
 
 class Phase(NamedTuple):
-    """A part of a motion in one mode of every rigid contact: from when on, the parameters that say so, the modes."""
+    """A part of a motion in one mode of every rigid contact: from when on, the parameters that hold them, the modes."""
 
     t: float
     p: np.ndarray

@@ -1,6 +1,6 @@
 """Numeric algorithms that do without the rest of the package: generated Python modules hold the text of these files as it is.
 
-Names begin with symdyn_, as those of the C beside them (templates/c/runtime/symdyn_*.h), which takes the same steps in the same
+Names begin with symdyn_, as those of the C next to them (templates/c/runtime/symdyn_*.h), which takes the same steps in the same
 order: tests/tape/test_algorithms.py compares both bit by bit. Functions have no types, as in generated modules.
 """
 

@@ -1,0 +1,78 @@
+"""Spelling, and the words that docs/style.md does not want, in pages, notebooks and docstrings."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+STYLE = ROOT / "docs" / "style.md"
+PAGES = [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+         *sorted((ROOT / "notebooks").glob("*.py"))]
+
+
+def unwanted(style: str) -> dict[str, str]:
+    """The words of the table -> what to write in their place."""
+    rows = re.findall(r"^\| (.+) \| (.+) \|$", style, re.MULTILINE)
+    return {word: right for left, right in rows if left not in ("not", "---") for word in left.split(", ")}
+
+
+def prose(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines of text with their numbers: of a page without its code, of a notebook its markdown, of a module its docstrings."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    if path.suffix == ".md":
+        yield from _outside_code(lines)
+    elif path.is_relative_to(ROOT / "notebooks"):
+        yield from ((k, line) for k, line in enumerate(lines, 1) if line.startswith("# "))
+    else:
+        for node in ast.walk(ast.parse("\n".join(lines))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
+                first = node.body[0]
+                yield from ((k, lines[k - 1]) for k in range(first.lineno, (first.end_lineno or 0) + 1))
+
+
+def _outside_code(lines: list[str]) -> Iterator[tuple[int, str]]:
+    code = False
+    for k, line in enumerate(lines, 1):
+        if line.startswith("```"):
+            code = not code
+        elif not code:
+            yield k, line
+
+
+def found(paths: list[Path], words: dict[str, str]) -> list[str]:
+    pattern = re.compile(rf"\b({'|'.join(map(re.escape, words))})\b", re.IGNORECASE)
+    return [f"{path.name}:{k}: {match[0]!r}; write: {words[match[0].lower()]}" for path in paths if path != STYLE
+            for k, line in prose(path) for match in pattern.finditer(re.sub(r"`[^`]*`", "", line))]
+
+
+def test_pages_and_notebooks_use_the_words_of_the_field() -> None:
+    assert found(PAGES, unwanted(STYLE.read_text(encoding="utf-8"))) == []
+
+
+def test_docstrings_use_the_words_of_the_field() -> None:
+    modules = sorted((ROOT / "symdyn").rglob("*.py"))
+    assert found(modules, unwanted(STYLE.read_text(encoding="utf-8"))) == []
+
+
+def test_an_unwanted_word_is_found(tmp_path: Path) -> None:
+    """In a page outside of code, and in a docstring."""
+    page, module = tmp_path / "page.md", tmp_path / "module.py"
+    page.write_text("A value told\n\n```python\ntold = 1\n```\nand `told`.\n", encoding="utf-8")
+    module.write_text('"""Begins anew."""\ntold = 1\n', encoding="utf-8")
+    assert found([page, module], {"told": "reports", "anew": "again"}) == ["page.md:1: 'told'; write: reports",
+                                                                        "module.py:1: 'anew'; write: again"]
+
+
+def test_spelling() -> None:
+    """By codespell, with the words that pyproject.toml lists."""
+    pytest.importorskip("codespell_lib")
+    texts = ["docs", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "notebooks", "symdyn", "templates"]
+    run = subprocess.run([sys.executable, "-m", "codespell_lib", *texts], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
