@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from html import unescape
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import pytest
 
@@ -109,6 +112,22 @@ def test_mechanisms_of_the_gallery_move(site: Path, shown: Any, name: str) -> No
             page.wait_for_timeout(500)
             assert view.evaluate(time) == 0
         page.close()
+
+
+def test_links_within_the_site_lead_somewhere(site: Path) -> None:
+    """Every address of a page and every part that it names are there."""
+    pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html") if "_static" not in page.parts}
+    ids = {page: set(map(unescape, re.findall(r'\bid="([^"]+)"', text))) for page, text in pages.items()}
+    links = [(page, unescape(link)) for page, text in pages.items() for link in re.findall(r'(?:href|src)="([^"]+)"', text)]
+    assert len(links) > 1000
+    for page, link in links:
+        if re.match("[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        file = page.parent / unquote(name.partition("?")[0]) if name else page
+        file = Path(os.path.normpath(file))
+        assert file.exists(), (page.name, link)
+        assert not anchor or file not in ids or unquote(anchor) in ids[file], (page.name, link)
 
 
 def test_the_search_finds_a_name(site: Path, shown: Any) -> None:
