@@ -1,9 +1,9 @@
-"""The right-hand side on vectors, a state in each lane: the same statements as those of one state, so the same rounding."""
+"""Functions on vectors, a state in each lane: the same statements as those of one state, so the same rounding."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,15 +30,15 @@ class LaneFunction:
 
 @dataclass(frozen=True)
 class Batch:
-    """What a template needs: the right-hand side on vectors, and the operations that it uses."""
+    """What a template needs: functions on vectors, by name, and the operations that they use."""
 
-    function: Function
+    functions: Mapping[str, Function]
     operations: tuple[LaneFunction, ...]
 
 
 def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str, Tape], titles: Mapping[str, str],
-             places: Mapping[str, tuple[str, int]], otherwise: Mapping[str, Tape]) -> Batch:
-    """The function rhs of a program on vectors.
+             places: Mapping[str, tuple[str, int]], otherwise: Mapping[str, Tape], names: Sequence[str] = ("rhs",)) -> Batch:
+    """Functions of a program on vectors.
 
     folder   of the backend; the dialect of vectors is in `batch` in it
     Where the program tries one way first, this is that way: lanes where it fails are computed one by one.
@@ -47,13 +47,12 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     dialect = read_dialect(folder / "batch")
     dialect = replace(dialect, operations={
         op: f"{f.name}({', '.join(f'VECTOR({{{k}}})' for k in range(len(f.arguments)))})" for op, f in available.items()})
-    function = next(f for f in build(dialect, tapes, titles, places, otherwise=otherwise, like=program).functions
-                    if f.name == "rhs")
-    function = function.regular or function
-    text = "\n".join(line for part in (function.parts or (function,)) for lines in
+    built = build(dialect, tapes, titles, places, otherwise=otherwise, like=program).functions
+    functions = {f.name: f.regular or f for f in built if f.name in names}
+    text = "\n".join(line for function in functions.values() for part in (function.parts or (function,)) for lines in
                      (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
     used = set(re.findall(rf"\b{_PREFIX}\w+", text))
-    return Batch(function, tuple(f for f in available.values() if f.name in used))
+    return Batch(functions, tuple(f for f in available.values() if f.name in used))
 
 
 def _lane_functions(scalar: Dialect) -> dict[str, LaneFunction]:

@@ -67,6 +67,7 @@ class Content:
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
     columns       of sensitivities, which are the last entries of z; carried: weights that are carried back besides those of x
     jacobians     those whose tapes are derivatives along directions
+    rows          functions that take rows of states with a state in each lane
     """
 
     name: str
@@ -86,6 +87,7 @@ class Content:
     columns: int = 0
     carried: int | None = None
     jacobians: Mapping[str, Columns] = field(default_factory=dict)
+    rows: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -146,12 +148,16 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     vectors = read_dialect(folder / "columns") if content.jacobians else None
     program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.jacobians,
                     vectors=vectors)
-    lanes = None
-    if batch and backend == "c" and "rhs" in content.tapes:
-        shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
-        lanes = batch_of(shipped.parent, dialect, program, content.tapes, content.titles, places, content.otherwise)
+    lanes, many = None, None
+    if backend == "c":
+        shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
+        on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, places,
+                                       content.otherwise)
+        lanes = on_vectors() if batch and "rhs" in content.tapes else None
+        many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
     context = _context(content, program, dialect, standalone, integrator, lanes, method, 0 if only else states)
+    context = _context(content, program, dialect, standalone, integrator, lanes, many, method, states)
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
@@ -234,7 +240,7 @@ def _template_fault(template: str, error: Exception) -> str:
 
 
 def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool,
-             lanes: Batch | None, method: str, states: int) -> dict[str, Any]:
+             lanes: Batch | None, many: Batch | None, method: str, states: int) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
@@ -308,10 +314,11 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": _metadata_lines(metadata),
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
-        "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
+        "n_in": sizes["inputs"], "n_ud": sizes["ud"],
+        "signature": signature, "part_signature": part_signature, "part_call": part_call,
         "along_signature": along_signature, "uses_columns": any(f.along and not f.motion for f in written),
         "uses_motion_columns": any(f.motion for f in written),
-        "lanes": lanes, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
+        "lanes": lanes, "many": many, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
         "one_call": ", ".join([*("time" if g == "t" else state(g, "one") for g in uses.get("rhs", ())), "result"]),
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
         "rows_call": rows_call, "shape_text": _shape_text,

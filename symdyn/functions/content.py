@@ -21,6 +21,7 @@ from symdyn.backend.metadata import (
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
+from symdyn.formulation.derivatives import second_named
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.printed.skipped import skipped
@@ -79,7 +80,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    event_records(equations) if "events" in names else (),
                    _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
                    len(right_side.sensitivities), None if right_side.adjoint is None else len(right_side.adjoint),
-                   {name: replace(made, tape=tapes[name]) for name, made in several.items()})
+                   {name: replace(made, tape=tapes[name]) for name, made in several.items()},
+                   tuple(name for name in names if second_named(name) and name not in several))
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
