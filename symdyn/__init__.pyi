@@ -115,7 +115,6 @@ from symdyn.formulation.by_hand.augmented import augmented as augmented
 from symdyn.formulation.by_hand.embedding import embedding as embedding
 from symdyn.frames import Frame as Frame
 from symdyn.frames import rate as rate
-from symdyn.sdf.read import read_sdf as read_sdf
 from symdyn.mjcf.read import read_mjcf as read_mjcf
 from symdyn.model import contacts as contacts
 from symdyn.model import shapes as shapes
@@ -244,6 +243,7 @@ from symdyn.runtime.inputs.inputs import Smooth as Smooth
 from symdyn.runtime.inputs.sampled import Sampled as Sampled
 from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.runtime.losses import Loss as Loss
+from symdyn.sdf.read import read_sdf as read_sdf
 from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.sympy_mechanics.system import from_system as from_system
 from symdyn.urdf.read import read_urdf as read_urdf

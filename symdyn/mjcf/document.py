@@ -147,12 +147,14 @@ class Reader:
             for name in ("meshdir", "assetdir", "texturedir", "strippath"):
                 attributes.pop(name, None)
         if element.tag == "model":
-            self._at(path, element.line, "<model> attaches another file, which is not read; save the whole model in one file first, "
+            self._at(path, element.line, "<model> attaches another file, which is not read; save the whole model in one file "
+                                         "first, "
                                          "as MjSpec.to_xml of MuJoCo writes it")
         elif "file" in attributes and element.tag in _FOLDERS:
             attributes["file"] = self._asset(element, path)
         elif any(name.startswith("file") for name in attributes):
-            self._at(path, element.line, f"<{element.tag}> reads a file, which is taken for meshes and height fields alone; leave it "
+            self._at(path, element.line, f"<{element.tag}> reads a file, which is taken for meshes and height fields alone; "
+                                         "leave it "
                                          "out")
         listed = "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
         self._row(f"<{element.tag}{listed}{'' if element.children else '/'}>", path, element.line)

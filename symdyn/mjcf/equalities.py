@@ -39,7 +39,8 @@ class Equalities:
     def _dependent(self, scalar: Scalar) -> Iterator[str]:
         found = self.numbers.multiple(scalar.coordinate, self.owners)
         if found is None:
-            self.faults.append(f"joint {shown(scalar.name)} has the coordinate {scalar.coordinate}; written are coordinates of its own, "
+            self.faults.append(f"joint {shown(scalar.name)} has the coordinate {scalar.coordinate}; written are coordinates of "
+                               "its own, "
                                "and multiples of another's plus a number")
             return
         source, factor, offset = found
@@ -51,7 +52,8 @@ class Equalities:
             yield self._joint(loop.name, joints[1].name, joints[0].name, [loop.offset, loop.ratio])
             return
         if not isinstance(loop, (Fixed, Revolute, Spherical)):
-            self.faults.append(f"the loop {shown(loop.name)} is closed by a {loop.kind} joint; written are fixed, revolute and spherical "
+            self.faults.append(f"the loop {shown(loop.name)} is closed by a {loop.kind} joint; written are fixed, revolute and "
+                               "spherical "
                                "ones, and gears")
             return
         ends = ((loop.parent, loop.parent_point, loop.parent_rotation), (loop.child, loop.child_point, loop.child_rotation))
@@ -83,7 +85,8 @@ class Equalities:
                 if polynomial is not None and polynomial.degree() <= _DEGREE:
                     yield self._joint(name, self.owners[y].name, self.owners[x].name, polynomial.all_coeffs()[::-1])
                     return
-        self.faults.append(f"the constraint {shown(name)} is {expression} = 0; written are y = polynomial of x, of the coordinates of "
+        self.faults.append(f"the constraint {shown(name)} is {expression} = 0; written are y = polynomial of x, of the "
+                           "coordinates of "
                            f"two joints, up to the power {_DEGREE}")
 
     def _joint(self, name: str, y: str, x: str | None, coefficients: Sequence[Any]) -> str:

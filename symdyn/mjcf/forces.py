@@ -83,8 +83,8 @@ class Forces:
             self.system.add_joint_force(joint, -_polynomial(self.take("k", name, k), higher, x), name=f"spring of {joint.name}")
 
     def _rotor(self, name: str, value: Any, inertia: float, linear: bool) -> None:
-        """The inertia that a speed has besides that of the bodies: a body on the ground that the coordinate moves, turning, or, with
-        a mass, along a line that gravity does not act along."""
+        """The inertia that a speed has besides that of the bodies: a body on the ground that the coordinate moves, turning, or,
+        with a mass, along a line that gravity does not act along."""
         label = self.tree.body_names.text(f"armature of {name}")
         J = self.take("J", name, inertia)
         value = sp.UnevaluatedExpr(value)
@@ -210,8 +210,8 @@ class Forces:
         self._apply(i, transmission, target, gear, ratio, force, name)
 
     def _moved(self, i: int, transmission: str, target: int, gear: np.ndarray) -> tuple[Any, Any] | None:
-        """Length and rate of what an actuator moves, before its gear, (None, None) where they are no scalars; None where that is held
-        or rejected."""
+        """Length and rate of what an actuator moves, before its gear, (None, None) where they are no scalars; None where that is
+        held or rejected."""
         if transmission == "TENDON":
             found = self.length(target)
             if found is None:

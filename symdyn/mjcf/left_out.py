@@ -30,7 +30,8 @@ class LeftOut:
     def rejected(self, kind: str, number: int, text: str) -> None:
         """Something that is not built, a fault unless the call leaves out the element."""
         if not self.named(self.c.name(kind, number)):
-            self.c.fault(kind, number, f"{text}, which is not built; pass leave_out={self.c.name(kind, number)!r} to do without it")
+            self.c.fault(kind, number, f"{text}, which is not built; pass leave_out={self.c.name(kind, number)!r} to do "
+                                       "without it")
 
     def named(self, name: str) -> bool:
         """Whether the call leaves out an element or a kind."""
@@ -54,7 +55,8 @@ class LeftOut:
 
     def faults(self) -> list[str]:
         """Patterns that fit nothing."""
-        return [f"{self.c.path}: leave_out has {p!r}, which fits no element that could be left out{nearest(p, self.seen)} (kinds: "
+        return [f"{self.c.path}: leave_out has {p!r}, which fits no element that could be left out{nearest(p, self.seen)} "
+                "(kinds: "
                 f"{', '.join(KINDS)})" for p in self.patterns if p not in self.used]
 
 
@@ -62,11 +64,13 @@ def examine(c: Compiled, out: LeftOut) -> None:
     """Note what has no place in a System, and reject what would make its motion another one."""
     m = c.m
     if (m.opt.density or m.opt.viscosity) and not out.named("fluid"):
-        c.faults.append(f"{c.path}: the model moves in a fluid (density {m.opt.density:g} kg/m^3, viscosity {m.opt.viscosity:g} Pa s), "
+        c.faults.append(f"{c.path}: the model moves in a fluid (density {m.opt.density:g} kg/m^3, viscosity "
+                        f"{m.opt.viscosity:g} Pa s), "
                         "which is not built; pass leave_out='fluid' to do without it, and add sd.LinearDamping, sd.Buoyancy or "
                         "sd.AddedMass")
     if m.nflex:
-        c.faults.append(f"{c.path}: the model has {m.nflex} deformable bodies (flex), which are not built; leave them out of the file, "
+        c.faults.append(f"{c.path}: the model has {m.nflex} deformable bodies (flex), which are not built; leave them out of "
+                        "the file, "
                         "and describe beams with system.add_flexible_body")
     if m.nplugin:
         c.faults.append(f"{c.path}: the model has plugins, whose forces are not known; leave them out of the file")

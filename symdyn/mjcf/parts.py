@@ -40,7 +40,8 @@ class Numbers:
         return " ".join(map(self.text, values))
 
     def multiple(self, coordinate: sp.Expr, owners: Mapping[Any, Scalar]) -> tuple[Scalar, float, float] | None:
-        """The scalar joint whose coordinate another is a multiple of, the factor and the offset; None for any other expression."""
+        """The scalar joint whose coordinate another is a multiple of, the factor and the offset; None for any other
+        expression."""
         q = coordinate.doit().xreplace(self.values)
         sources = sorted(symbols_of(q), key=str)
         slope = q.diff(sources[0]) if len(sources) == 1 else sp.nan

@@ -14,7 +14,8 @@ _SHOWN = 3
 
 
 def draw(tree: Tree) -> None:
-    """Boxes, spheres, ellipsoids, cylinders, capsules and meshes of the groups that MuJoCo's viewer shows; planes are left out."""
+    """Boxes, spheres, ellipsoids, cylinders, capsules and meshes of the groups that MuJoCo's viewer shows; planes are left
+    out."""
     m = tree.m
     for g in range(m.ngeom):
         found = _triangles(tree, g)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
+from symdyn.kinds import flag
 from symdyn.mjcf.closures import Closures
 from symdyn.mjcf.compiled import Compiled
 from symdyn.mjcf.document import KIND
@@ -16,7 +17,6 @@ from symdyn.mjcf.forces import Forces
 from symdyn.mjcf.left_out import LeftOut, examine
 from symdyn.mjcf.pictures import draw
 from symdyn.mjcf.tree import Tree
-from symdyn.kinds import flag
 from symdyn.model.system import System
 from symdyn.shown import shown
 from symdyn.urdf.document import as_path
@@ -31,18 +31,18 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     path       of the file, or its text, which begins with "<"
     symbolic   what becomes a parameter instead of a number, the number of the file its default: names of parameters, of bodies,
                joints, tendons or actuators (all of theirs), with * and ?: m_BODY, c_x_BODY, I_xx_BODY about the centre of mass in
-               the body's axes, p_x_BODY the body in its parent, a_x_JOINT the joint's anchor in its body, d_ damping, k_ stiffness,
-               J_ armature, gear_, kp_, kv_, gain_, tau_ACTUATOR, and g
+               the body's axes, p_x_BODY the body in its parent, a_x_JOINT the joint's anchor in its body, d_ damping, k_
+               stiffness, J_ armature, gear_, kp_, kv_, gain_, tau_ACTUATOR, and g
     name       of the system; default: the model's
     fixed      names of joints, with * and ?, that are held where the file has them
-    leave_out  what the motion is to do without: names of elements that are not built, and of what a warning reports otherwise, the
-               kinds "contacts", "limits", "friction", "ranges", "inactive" and "mocap", with * and ?
+    leave_out  what the motion is to do without: names of elements that are not built, and of what a warning reports otherwise,
+               the kinds "contacts", "limits", "friction", "ranges", "inactive" and "mocap", with * and ?
     folder     that no file of the model may be outside of; default: that of the file
     visuals    whether bodies look in pictures as the geoms of the groups 0 to 2, each with 800 triangles at most
 
-    MuJoCo's own compiler resolves default classes, frames, orientations and inertias of geoms. Coordinates are MuJoCo's: q_JOINT of
-    hinges and slides, e0_ ... e3_JOINT of balls, and before these x_, y_, z_JOINT of free joints; so are the speeds, and the initial
-    state. Of several joints of one body the inner ones carry bodies without mass. Armature is a body on the ground that the
+    MuJoCo's own compiler resolves default classes, frames, orientations and inertias of geoms. Coordinates are MuJoCo's: q_JOINT
+    of hinges and slides, e0_ ... e3_JOINT of balls, and before these x_, y_, z_JOINT of free joints; so are the speeds, and the
+    initial state. Of several joints of one body the inner ones carry bodies without mass. Armature is a body on the ground that the
     coordinate moves. connect and weld become exact loops, couplings of joints and tendons exact constraints; in MuJoCo they are
     soft. Actuators are inputs called after them; those with a state have act_NAME.
 
@@ -87,7 +87,8 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
         raise ModelError(faults, title)
     report = out.report()
     if report:
-        warnings.warn(f"{taken}: not taken over are {report}; add what matters, such as sd.Contact, sd.Stop or sd.JointFriction, or "
+        warnings.warn(f"{taken}: not taken over are {report}; add what matters, such as sd.Contact, sd.Stop or "
+                      "sd.JointFriction, or "
                       "name it in leave_out", ModelWarning, stacklevel=2)
     return system
 

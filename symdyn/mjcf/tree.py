@@ -25,8 +25,8 @@ _ROUNDING = 1e-15
 class Tree:
     """Builds bodies and joints; `bodies` by MuJoCo's numbers, `joints` and `coordinates` likewise, held ones left out.
 
-    A body with several joints has bodies without mass between them, each turned by one joint more, as MuJoCo applies them: in their
-    order, each about its anchor in the axes that those before it have turned.
+    A body with several joints has bodies without mass between them, each turned by one joint more, as MuJoCo applies them: in
+    their order, each about its anchor in the axes that those before it have turned.
     """
 
     def __init__(self, model: Compiled, system: System, patterns: Sequence[str], held: Sequence[str]) -> None:
@@ -81,7 +81,8 @@ class Tree:
             return
         for j in moving:
             last = j == moving[-1]
-            child = body if last else self.system.add_body(self.body_names.text(f"{name} before {self.c.name('joint', moving[-1])}"))
+            child = body if last else self.system.add_body(self.body_names.text(f"{name} before "
+                                                                                f"{self.c.name('joint', moving[-1])}"))
             self._joint(j, parent, child, point, R)
             parent, point, R = child, [0, 0, 0], np.eye(3)
 

@@ -22,7 +22,8 @@ GRAVITY = (0.0, 0.0, -9.8)
 
 @dataclass(frozen=True)
 class SdfLink:
-    """Mass, kg; pose of the centre of mass; inertia about it in the axes of that pose, kg m^2, as INERTIA; whether it has weight."""
+    """Mass, kg; pose of the centre of mass; inertia about it in the axes of that pose, kg m^2, as INERTIA; whether it has
+    weight."""
 
     name: str
     mass: float
@@ -128,10 +129,11 @@ class Parser:
                 what = f"model {shown(name)}"
                 relative, pose, line = f.pose(child, what)
                 if "placement_frame" in child.attributes:
-                    f.at(child.line, f"{what} is nested and has a placement_frame, which is not read; give the pose of the model itself")
+                    f.at(child.line, f"{what} is nested and has a placement_frame, which is not read; give the pose of the "
+                                     "model itself")
                 own = f"{name}::{MODEL}"
-                model.frames.add(own, FrameOf(what, self._named(relative, scope) or scope + MODEL, pose, self._canonical(child, name),
-                                              line))
+                model.frames.add(own, FrameOf(what, self._named(relative, scope) or scope + MODEL, pose, self._canonical(child,
+                                              name), line))
                 model.frames.add(name, FrameOf(what, own, Pose(), own, line))
                 self._model(child, model, f"{name}::")
             elif child.tag == "include":
@@ -157,12 +159,14 @@ class Parser:
         if not model.frames.add(name, FrameOf(what, self._named(relative, scope) or scope + MODEL, pose, "", line)):
             return
         if f.true(element, "kinematic"):
-            f.at(element.line, f"{what} is kinematic: it moves as it is told; leave <kinematic> out, or hold its joint with fixed=...")
+            f.at(element.line, f"{what} is kinematic: it moves as it is told; leave <kinematic> out, or hold its joint with "
+                               "fixed=...")
         inertial = element.find("inertial")
         mass, center, entries = 1.0, Pose(), [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]
         if inertial is not None:
             if inertial.attributes.get("auto") in ("true", "1"):
-                f.at(inertial.line, f"{what}: its inertia is to follow from its collisions (auto), which is not computed; write mass and "
+                f.at(inertial.line, f"{what}: its inertia is to follow from its collisions (auto), which is not computed; "
+                                    "write mass and "
                                     "inertia")
             if inertial.find("fluid_added_mass") is not None:
                 f.at(inertial.line, f"{what} has an added mass of a fluid, which is not read; leave it out, and add sd.AddedMass")

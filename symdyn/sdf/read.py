@@ -45,11 +45,11 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     fixed      names of joints, with * and ?, that are held where their coordinates are zero
     leave_out  what no warning is to report: "contacts", "limits", "friction", "plugins", with * and ?
 
-    Poses may be relative to links, joints, nested models and frames, axes expressed in them. Bodies are the links; those of nested
-    models are called inner::link. Coordinates are q_JOINT (universal: q_JOINT_1, q_JOINT_2; ball: e0_ ... e3_JOINT; free: x_, y_,
+    Poses may be relative to links, joints, nested models and frames, axes expressed in them. Bodies are the links; those of
+    nested models are called inner::link. Coordinates are q_JOINT (universal: q_JOINT_1, q_JOINT_2; ball: e0_ ... e3_JOINT; free: x_, y_,
     z_, e0_ ... e3_LINK, which start at the link's pose). A second joint that carries a link closes a loop, exactly. Joints that
-    mimic have no coordinate of their own. Damping and springs of axes are forces; a link without <inertial> has 1 kg and 1 kg m^2,
-    and the world without <gravity> 9.8 m/s^2 along -z, as the format has it.
+    mimic have no coordinate of their own. Damping and springs of axes are forces; a link without <inertial> has 1 kg and 1 kg
+    m^2, and the world without <gravity> 9.8 m/s^2 along -z, as the format has it.
 
     Raises ModelError that lists every fault of the file with its line: of values, of frames, screws and gearboxes, files that are
     brought in; ArgumentError for arguments; MissingExtra without defusedxml. Warns (ModelWarning) of collisions, limits, friction
@@ -146,7 +146,8 @@ class _Builder:
             reached.add(ends[found.name][1])
         left = [j for link, j in carrying.items() if link not in reached]
         if left:
-            self.faults.at(left[0].line, f"joints {', '.join(shown(j.name) for j in left)} hang on each other in a circle; join one of their "
+            self.faults.at(left[0].line, f"joints {', '.join(shown(j.name) for j in left)} hang on each other in a circle; "
+                                         "join one of their "
                                          "links to the world or to the rest")
             return system
         for joint in loops:
@@ -169,9 +170,10 @@ class _Builder:
             I[i, k] = I[k, i] = value
         least = float(np.linalg.eigvalsh(I)[0])
         if least < -1e-12 * np.abs(I).max():
-            self.faults.at(link.line, f"link {shown(name)}: its inertia has the principal moment {least:.4g} kg m^2, which is negative; "
+            self.faults.at(link.line, f"link {shown(name)}: its inertia has the principal moment {least:.4g} kg m^2, which is "
+                                      "negative; "
                                       "give the inertia about the centre of mass")
-        if (link.center.R != np.eye(3)).any():
+        if (np.eye(3) != link.center.R).any():
             I = link.center.R @ I @ link.center.R.T
         rows: list[list[Any]] = [[0] * 3 for _ in range(3)]
         for i, k in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
@@ -251,8 +253,10 @@ class _Builder:
         assert joint.axes[0].mimic is not None
         source, multiplier, offset, reference = joint.axes[0].mimic
         if source not in self.coordinates:
-            self.faults.at(joint.axes[0].line, f"joint {shown(joint.name)} mimics {shown(source)}, which has no coordinate of its own"
-                                               f"{nearest(source, self.coordinates)}; name a revolute or prismatic joint that moves")
+            self.faults.at(joint.axes[0].line, f"joint {shown(joint.name)} mimics {shown(source)}, which has no coordinate of "
+                                               "its own"
+                                               f"{nearest(source, self.coordinates)}; name a revolute or prismatic joint that "
+                                               "moves")
             return None
         return sp.UnevaluatedExpr(self.coordinates[source]) if (multiplier, offset, reference) == (1, 0, 0) else (
             plain(multiplier) * (self.coordinates[source] - plain(reference)) + plain(offset))

@@ -47,7 +47,8 @@ class Values(FileFaults):
         if found is None:
             return "", Pose(), parent.line
         if found.attributes.get("frame"):
-            self.at(found.line, f"{what}: <pose> has the attribute frame={shown(found.attributes['frame'])}, which versions before 1.7 "
+            self.at(found.line, f"{what}: <pose> has the attribute frame={shown(found.attributes['frame'])}, which versions "
+                                "before 1.7 "
                                 "left without a meaning; write relative_to of version 1.7")
         form = found.attributes.get("rotation_format", "euler_rpy")
         if not found.text:

@@ -65,8 +65,8 @@ def decimated(vertices: np.ndarray, faces: np.ndarray, most: int = TRIANGLES) ->
 def box(half: np.ndarray) -> Triangles:
     """Of half its edges, (3,)."""
     vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7],
-             [1, 7, 3]]
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5,
+             7], [1, 7, 3]]
     return vertices, np.array(faces)
 
 

@@ -35,7 +35,8 @@ class Pose:
 
     @property
     def quaternion(self) -> np.ndarray:
-        """The unit quaternion (4,), w first and not negative. Source: the largest of its four components first (Shepperd 1978)."""
+        """The unit quaternion (4,), w first and not negative. Source: the largest of its four components first (Shepperd
+        1978)."""
         R = self.R
         squares = np.array([1 + R[0, 0] + R[1, 1] + R[2, 2], 1 + R[0, 0] - R[1, 1] - R[2, 2], 1 - R[0, 0] + R[1, 1] - R[2, 2],
                             1 - R[0, 0] - R[1, 1] + R[2, 2]])

@@ -80,12 +80,14 @@ class Visuals:
         found = [c.resolve() for c in candidates]
         held = [c for c in found if c.is_relative_to(self.folder)]
         if not held:
-            self.faults.at(line, f"{what}: the mesh {shown(name)} is outside of the folder {self.folder}; pass folder=... with one that "
+            self.faults.at(line, f"{what}: the mesh {shown(name)} is outside of the folder {self.folder}; pass folder=... with "
+                                 "one that "
                                  "holds all files of the robot")
             return None
         here = next((c for c in held if c.is_file()), None)
         if here is None:
-            self.faults.at(line, f"{what}: there is no mesh {shown(name)} (looked for {held[0]}); pass folder=..., or visuals=False")
+            self.faults.at(line, f"{what}: there is no mesh {shown(name)} (looked for {held[0]}); pass folder=..., or "
+                                 "visuals=False")
         return here
 
     def _color(self, visual: Element, materials: Mapping[Any, Element], what: str) -> list[float] | None:

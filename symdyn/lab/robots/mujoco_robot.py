@@ -1,5 +1,5 @@
-"""A model in MuJoCo, read from the same file, and what it computes in symdyn's order: without contacts, limits and friction, and with
-equality constraints that hold exactly."""
+"""A model in MuJoCo, read from the same file, and what it computes in symdyn's order: without contacts, limits and friction, and
+with equality constraints that hold exactly."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ class MujocoRobot:
                         u_at[u] = at[name][1] + n
         missing = [str(s) for taken in (q_at, u_at) for s, k in taken.items() if k < 0]
         if missing or len(u_at) != self.m.nv:
-            raise SymdynError(f"MuJoCo has {self.m.nv} speeds, symdyn {len(u_at)}, of which {', '.join(missing) or 'none'} are missing "
+            raise SymdynError(f"MuJoCo has {self.m.nv} speeds, symdyn {len(u_at)}, of which {', '.join(missing) or 'none'} are "
+                              "missing "
                               "there")
         return np.array(list(q_at.values()), dtype=int), np.array(list(u_at.values()), dtype=int)
 
