@@ -253,7 +253,8 @@ class Forces:
             self.out.rejected("actuator", i, "feeds back the length of something that has none")
             return None
         first = float(g[0])
-        scale = self.take("kp" if first and affine[1] == -first else "kv" if first and affine[2] == -first else "gain", name, first)
+        scale = self.take("kp" if first and affine[1] == -first else "kv" if first and affine[2] == -first else "gain", name,
+                          first)
         slopes: list[Any] = [-scale if first and affine[1] == -first else self._slope("kp", name, affine[1]),
                              -scale if first and affine[2] == -first and affine[1] != -first
                              else self._slope("kv", name, affine[2])]
@@ -297,7 +298,8 @@ class Forces:
         if self.dampers and (d or more.any()):
             self.system.add_joint_force(joint, -ratio**2 * _damping(plain(d), more, q.dot), name=f"{label}, damping")
         if J:
-            self._rotor(f"{name} at {self.c.name('joint', target)}", q, J * float(gear[0]) ** 2, self.c.joint(target)[0] == "slide")
+            self._rotor(f"{name} at {self.c.name('joint', target)}", q, J * float(gear[0]) ** 2, self.c.joint(target)[0] ==
+                        "slide")
 
 
 def _polynomial(first: Any, higher: np.ndarray, x: Any) -> Any:

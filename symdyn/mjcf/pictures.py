@@ -25,7 +25,8 @@ def draw(tree: Tree) -> None:
         if rgba[3] == 0:
             continue
         vertices = found[0] @ rotation(m.geom_quat[g]).T + m.geom_pos[g]
-        tree.system.draw(tree.bodies[int(m.geom_bodyid[g])], Mesh(vertices, found[1]), color=[float(np.clip(v, 0, 1)) for v in rgba[:3]])
+        tree.system.draw(tree.bodies[int(m.geom_bodyid[g])], Mesh(vertices, found[1]), color=[float(np.clip(v, 0, 1)) for v in
+                                                                                              rgba[:3]])
 
 
 def _triangles(tree: Tree, g: int) -> Triangles | None:

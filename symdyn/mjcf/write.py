@@ -36,7 +36,8 @@ def mjcf_text(model: Model) -> str:
     if writer.faults:
         raise ModelError(writer.faults, model.name)
     if writer.points:
-        warnings.warn(f"{model.name}: MuJoCo moves no body without moments of inertia; the point masses {', '.join(writer.points)} are "
+        warnings.warn(f"{model.name}: MuJoCo moves no body without moments of inertia; the point masses "
+                      f"{', '.join(writer.points)} are "
                       f"written with {_POINT:g} kg m^2", ModelWarning, stacklevel=4)
     return "\n".join(lines) + "\n"
 
@@ -105,7 +106,8 @@ class _Writer:
         known = (Fixed, Free, Spherical)
         for joint in model.joints:
             if not isinstance(joint, known) and joint.kind not in ("revolute", "prismatic", "universal", "planar", "cylindrical"):
-                self.faults.append(f"joint {shown(joint.name)} is {joint.kind}, which MJCF has no joint for; describe it by fixed, "
+                self.faults.append(f"joint {shown(joint.name)} is {joint.kind}, which MJCF has no joint for; describe it by "
+                                   f"fixed, "
                                    "revolute, prismatic, universal, planar, cylindrical, spherical or free joints")
 
     # -- armature
@@ -173,7 +175,8 @@ class _Writer:
             body = self.model.children[chain[-1]]
             below = self.below.get(body, [])
             moving = not isinstance(self.model.joints[chain[-1]], Fixed)
-            light = self.numbers.value(self.model.bodies[body].mass) == 0 and not self.numbers.array(self.model.bodies[body].inertia).any()
+            of = self.model.bodies[body]
+            light = self.numbers.value(of.mass) == 0 and not self.numbers.array(of.inertia).any()
             if not (moving and light and len(below) == 1 and body not in self.sites) or isinstance(
                     self.model.joints[below[0]], (Fixed, Free)):
                 return chain
@@ -190,11 +193,13 @@ class _Writer:
             self.points.append(body.name)
             I, least = _POINT * np.eye(3), _POINT
         if moving and (mass < _LEAST or least < _LEAST):
-            self.faults.append(f"body {shown(body.name)} has the mass {mass:g} kg and the least moment of inertia {least:g} kg m^2; "
+            self.faults.append(f"body {shown(body.name)} has the mass {mass:g} kg and the least moment of inertia {least:g} kg "
+                               f"m^2; "
                                "MuJoCo moves no body without either: give it some, however small")
         moments = np.linalg.eigvalsh(I)
         if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
-            self.faults.append(f"body {shown(body.name)} has the principal moments {', '.join(f'{v:g}' for v in moments)} kg m^2, the "
+            self.faults.append(f"body {shown(body.name)} has the principal moments {', '.join(f'{v:g}' for v in moments)} kg "
+                               f"m^2, the "
                                "largest more than the sum of the others, which MuJoCo rejects; no real body has them")
         entries = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
         about = f'diaginertia="{self.numbers.texts(entries[:3])}"' if not any(entries[3:]) else \
@@ -220,12 +225,14 @@ class _Writer:
         if isinstance(joint, Free):
             still = np.abs(whole.R - np.eye(3)).max() + np.abs(whole.p).max()
             if still > 0 or self.model.parents[self.model.joints.index(joint)] != -1:
-                self.faults.append(f"joint {shown(joint.name)} is free and its frames are not those of the ground and of the body; MJCF "
+                self.faults.append(f"joint {shown(joint.name)} is free and its frames are not those of the ground and of the "
+                                   f"body; MJCF "
                                    "has no others: leave out its points and rotations")
             yield f'<joint name={quoteattr(joint.name)} type="free"{self._attributes(joint.name)}/>'
             return
         if np.abs(R - np.eye(3)).max() > 0:
-            self.faults.append(f"joint {shown(joint.name)} is spherical and its frame on the child is turned; MJCF has quaternions in the "
+            self.faults.append(f"joint {shown(joint.name)} is spherical and its frame on the child is turned; MJCF has "
+                               f"quaternions in the "
                                "body's axes: leave out its child_rotation")
         yield (f'<joint name={quoteattr(joint.name)} type="ball" pos="{self.numbers.texts(anchor)}"'
                f"{self._attributes(joint.name)}/>")
@@ -252,7 +259,8 @@ class _Writer:
         elif isinstance(load, ForceBetween):
             self._tendon(load, [], load.force)
         else:
-            self.faults.append(f"{load.label} is a load that MJCF has no words for; leave it out (written are forces along joints and "
+            self.faults.append(f"{load.label} is a load that MJCF has no words for; leave it out (written are forces along "
+                               f"joints and "
                                "between points)")
 
     def _on_scalar(self, load: JointForce, s: Scalar, value: sp.Expr) -> None:
@@ -271,7 +279,8 @@ class _Writer:
         moment = stiffness * reference + float(rest)
         stiffness += k
         if stiffness == 0 and moment != 0:
-            self.faults.append(f"{load.label} on joint {shown(s.name)} is the constant {moment:g} besides what is linear in q; MJCF "
+            self.faults.append(f"{load.label} on joint {shown(s.name)} is the constant {moment:g} besides what is linear in q; "
+                               f"MJCF "
                                "has springs alone: make it an input")
             return
         self.springs[s.name] = stiffness, moment / stiffness if stiffness else 0.0
@@ -283,13 +292,16 @@ class _Writer:
         """Damping, or an input along given directions, on a spherical or a free joint."""
         values = [sp.expand(v.xreplace(self.numbers.values)) for v in load.values]
         slopes = [-v.diff(u) for v, u in zip(values, joint_speeds(joint), strict=True)]
-        if slopes[0].is_number and all(sp.expand(v + slopes[0] * u) == 0 for v, u in zip(values, joint_speeds(joint), strict=True)):
+        if slopes[0].is_number and all(sp.expand(v + slopes[0] * u) == 0 for v, u in zip(values, joint_speeds(joint),
+                                                                                         strict=True)):
             self.damping[joint.name] = self.damping.get(joint.name, 0.0) + float(slopes[0])
             return
         inputs = sorted({a for v in values for a in symbols_of(v)}, key=str)
         gears = [v.diff(inputs[0]) for v in values] if len(inputs) == 1 and isinstance(inputs[0], Input) else [sp.nan]
-        if not all(g.is_number for g in gears) or any(sp.expand(v - g * inputs[0]) != 0 for v, g in zip(values, gears, strict=False)):
-            self.faults.append(f"{load.label} on joint {shown(joint.name)} is {', '.join(map(str, values))}; written are equal damping of "
+        if not all(g.is_number for g in gears) or any(sp.expand(v - g * inputs[0]) != 0 for v, g in zip(values, gears,
+                                                                                                        strict=False)):
+            self.faults.append(f"{load.label} on joint {shown(joint.name)} is {', '.join(map(str, values))}; written are equal "
+                               f"damping of "
                                "all its speeds, and one input times numbers")
             return
         self._motor(inputs[0].name, f"joint={quoteattr(joint.name)}", self.numbers.texts([*gears, *[0] * (6 - len(gears))]))
@@ -303,20 +315,23 @@ class _Writer:
         linear = driven is None or (all(isinstance(a, Input) for a in inputs) and all(s.is_number for s in slopes) and sp.expand(
             driven - sum((s * a for s, a in zip(slopes, inputs, strict=True)), sp.S.Zero)) == 0)
         if not all(v.is_number for v in values) or not linear:
-            self.faults.append(f"{load.label} depends on the motion by a law of its own; written are springs and dampers with numbers, "
+            self.faults.append(f"{load.label} depends on the motion by a law of its own; written are springs and dampers with "
+                               f"numbers, "
                                "and forces that are linear in inputs")
             return
         ends = [self._site(body, point) for body, point in ((load.body_a, load.point_a), (load.body_b, load.point_b))]
         listed = "".join(f' {what}="{self.numbers.text(v)}"' for what, v in zip(("stiffness", "damping", "springlength"), values,
                                                                              strict=False))
         name = f"{load.label} {len(self.tendons) + 1}"
-        self.tendons.append(f'<spatial name={quoteattr(name)}{listed}>' + "".join(f'<site site="{end}"/>' for end in ends) + "</spatial>")
+        self.tendons.append(f'<spatial name={quoteattr(name)}{listed}>' + "".join(f'<site site="{end}"/>' for end in ends) +
+                            "</spatial>")
         for a, slope in zip(inputs, slopes, strict=True):
             self._motor(a.name, f"tendon={quoteattr(name)}", self.numbers.text(-slope))
 
     def _motor(self, name: str, target: str, gear: str) -> None:
         if any(f"name={quoteattr(name)}" in line for line in self.actuators):
-            self.faults.append(f"the input {name} drives several joints or loads; MJCF has an actuator for each: give each an input")
+            self.faults.append(f"the input {name} drives several joints or loads; MJCF has an actuator for each: give each an "
+                               f"input")
         self.actuators.append(f'<motor name={quoteattr(name)} {target} gear="{gear}"/>')
 
     def _site(self, body: Any, point: Any, R: Any = None) -> str:

@@ -679,8 +679,9 @@ class System:
 
         Fixed, revolute, prismatic, universal, planar, cylindrical, spherical and free joints are written; those with Euler angles
         as one slide or hinge a coordinate. Loops by fixed, revolute and spherical joints, gears, constraints y = polynomial of x
-        and dependent coordinates become equality constraints, which are soft in MuJoCo. Forces along joints that are linear in their
-        coordinate, speed and inputs, springs and dampers between points, and forces between points become stiffness, damping,
+        and dependent coordinates become equality constraints, which are soft in MuJoCo. Forces along joints that are linear in
+        their coordinate, speed and inputs, springs and dampers between points, and forces between points become stiffness,
+        damping,
         tendons and motors. Bodies without mass between joints vanish; a body on the ground that another joint's coordinate moves
         is its armature. Outputs, shapes and initial values have no part in it. Coordinates have the same order and meaning; the
         speeds, too, but those of Free joints with velocity="body". Returns the path.

@@ -60,7 +60,8 @@ def planes(vertices: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.nd
 def order(parts: Sequence[Part], places: Sequence[np.ndarray], camera: Camera) -> list[int]:
     """The parts from back to front; places: their vertices, n-frame."""
     n = len(parts)
-    faces = [planes(v, np.concatenate([part.corners, part.hidden]) if part.convex else part.hidden) for part, v in zip(parts, places, strict=True)]
+    faces = [planes(v, np.concatenate([part.corners, part.hidden]) if part.convex else part.hidden) for part, v in
+             zip(parts, places, strict=True)]
     flat = [camera.project(v) for v in places]
     low, high = np.array([f.min(axis=0) for f in flat]), np.array([f.max(axis=0) for f in flat])
     way = camera.toward(np.concatenate(places).mean(axis=0))

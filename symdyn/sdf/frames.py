@@ -37,7 +37,8 @@ class Frames:
     def add(self, name: str, frame: FrameOf) -> bool:
         """Whether the name is its own."""
         if name in self.known:
-            self.faults.at(frame.line, f"{frame.what} has the name of {self.known[name].what} (line {self.known[name].line}); links, "
+            self.faults.at(frame.line, f"{frame.what} has the name of {self.known[name].what} (line {self.known[name].line}); "
+                                       f"links, "
                                        "joints, frames and nested models need names of their own")
             return False
         self.known[name] = frame
@@ -52,7 +53,8 @@ class Frames:
             return Pose()
         frame = self.known[name]
         if name in waiting:
-            self.faults.at(frame.line, f"the poses of {', '.join(map(shown, waiting))} are relative to each other in a circle; make one "
+            self.faults.at(frame.line, f"the poses of {', '.join(map(shown, waiting))} are relative to each other in a circle; "
+                                       f"make one "
                                        "relative to the model")
             self.poses[name] = Pose()
             return Pose()
@@ -76,7 +78,8 @@ class Frames:
         passed: list[str] = []
         while name != WORLD:
             if name not in self.known or name in passed:
-                said = "in a circle" if name in passed else f"refers to {shown(name)}, which is no link or frame{nearest(name, self.known)}"
+                said = "in a circle" if name in passed else (f"refers to {shown(name)}, which is no link or frame"
+                                                             f"{nearest(name, self.known)}")
                 self.faults.at(line, f"{what} {'is attached ' if name in passed else ''}{said}")
                 return ""
             frame = self.known[name]

@@ -46,8 +46,10 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     leave_out  what no warning is to report: "contacts", "limits", "friction", "plugins", with * and ?
 
     Poses may be relative to links, joints, nested models and frames, axes expressed in them. Bodies are the links; those of
-    nested models are called inner::link. Coordinates are q_JOINT (universal: q_JOINT_1, q_JOINT_2; ball: e0_ ... e3_JOINT; free: x_, y_,
-    z_, e0_ ... e3_LINK, which start at the link's pose). A second joint that carries a link closes a loop, exactly. Joints that
+    nested models are called inner::link. Coordinates are q_JOINT (universal: q_JOINT_1, q_JOINT_2; ball: e0_ ... e3_JOINT;
+    free: x_,
+    y_, z_, e0_ ... e3_LINK, which start at the link's pose). A second joint that carries a link closes a loop, exactly. Joints
+    that
     mimic have no coordinate of their own. Damping and springs of axes are forces; a link without <inertial> has 1 kg and 1 kg
     m^2, and the world without <gravity> 9.8 m/s^2 along -z, as the format has it.
 
@@ -188,7 +190,8 @@ class _Builder:
         free = root == "floating" or (root == "file" and not self.model.static)
         label, body = self.joint_names.text(f"{name} root"), self.bodies[name]
         if not free:
-            self.built.add_joint(Fixed(label, self.built.ground, body, parent_point=_plain(pose.p), parent_rotation=_rows(pose.R)))
+            self.built.add_joint(Fixed(label, self.built.ground, body, parent_point=_plain(pose.p),
+                                       parent_rotation=_rows(pose.R)))
             return
         found = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
         self.built.add_joint(Free(label, self.built.ground, body, found, orientation=EulerParameters(), velocity="body"))

@@ -54,10 +54,12 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     Bodies are the links, with the links' frames. A joint's coordinate is q_JOINT (planar: x_, y_, theta_JOINT; floating: x_,
     y_, z_, e0_ ... e3_JOINT), where every character that no symbol has is an underscore. A joint that mimics another has no
     coordinate, but multiplier q + offset in terms of the other's; the drive of q then moves both. A link without <inertial> has
-    no mass. Friction, limits, drives and whatever else is in the file are not looked at, nor are files it refers to but with `visuals`.
+    no mass. Friction, limits, drives and whatever else is in the file are not looked at, nor,
+    but with `visuals`, files it refers to.
 
     Raises ModelError that lists every fault of the file with its line; ArgumentError for an unknown root, and for a path and
-    names that are none; MissingExtra without defusedxml, with meshes without trimesh. Source of the format: wiki.ros.org/urdf/XML.
+    names that are none; MissingExtra without defusedxml, with meshes without trimesh. Source of the format:
+    wiki.ros.org/urdf/XML.
 
     >>> import tempfile
     >>> system = sd.System("slider", gravity=[0, 0, -9.81])
@@ -90,7 +92,8 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     system = builder.system(base, order, following, moving, root == "floating")
     faults += builder.parameters.faults()
     if visuals:
-        Visuals(faults, path.parent if folder is None else as_path(folder, "the folder of a URDF")).draw(document, builder.bodies, system)
+        Visuals(faults, path.parent if folder is None else as_path(folder, "the folder of a URDF")).draw(document,
+                                                                                                         builder.bodies, system)
     _raise(faults, robot.name)
     return system
 

@@ -74,7 +74,8 @@ def test_the_elements() -> None:
 
 
 def test_symbols_take_the_file_s_numbers() -> None:
-    text = pendulum(' damping="0.2" stiffness="3" armature="0.1" pos="0 0 0.5"', '<actuator><position name="servo" joint="hinge" kp="7"'
+    text = pendulum(' damping="0.2" stiffness="3" armature="0.1" pos="0 0 0.5"',
+                    '<actuator><position name="servo" joint="hinge" kp="7"'
                     ' kv="0.5" gear="2"/></actuator>')
     system = sd.read_mjcf(text, symbolic=["g", "bar", "hinge", "servo"])
     values = {str(s): v for s, v in system.defaults.items()}
@@ -103,7 +104,8 @@ def test_a_part_of_what_is_not_taken_is_reported() -> None:
     with pytest.warns(ModelWarning) as warned:
         sd.read_mjcf(text)
     said = str(warned[0].message)
-    for part in ("contacts of 'floor' (text:4), 'geom_1' (text:3)", "limits of 'hinge' (text:3)", "frictionloss of 'hinge' (text:3)",
+    for part in ("contacts of 'floor' (text:4), 'geom_1' (text:3)", "limits of 'hinge' (text:3)",
+                 "frictionloss of 'hinge' (text:3)",
                  "ctrlrange of 'm' (text:5)", "name it in leave_out"):
         assert part in said
     sd.read_mjcf(text, leave_out=["contacts", "limits", "friction", "ranges"])  # warns of nothing
@@ -118,7 +120,8 @@ def test_a_part_of_what_is_not_taken_is_reported() -> None:
 
 
 def test_included_files_and_their_lines(tmp_path: Path) -> None:
-    saved(tmp_path, '<mujocoinclude>\n\n<body name="in"><joint name="j" type="ball" stiffness="1"/><geom size="1"/></body></mujocoinclude>',
+    saved(tmp_path, '<mujocoinclude>\n\n<body name="in"><joint name="j" type="ball" stiffness="1"/><geom '
+                    'size="1"/></body></mujocoinclude>',
           "parts/arm.xml")
     path = saved(tmp_path, '<mujoco><worldbody>\n<include file="parts/arm.xml"/></worldbody></mujoco>')
     with pytest.raises(ModelError) as raised:
@@ -169,21 +172,24 @@ WRAPPED = ('<worldbody><site name="s"/><geom name="w" size=".1" contype="0"/><si
     ("<mujoco>\n<worldbody>", "text:2: the file is no XML there (no element found); pass an MJCF file"),
     (pendulum(' foo="1"'), "text:3: MuJoCo rejects the model in 'joint'"),
     (pendulum(' type="bolt"'), "text:3: MuJoCo rejects the model in 'joint': invalid keyword: 'bolt'"),
-    (BOX.format(more=' stiffness="2"'), "text:2: joint 'j' is ball and has a stiffness, which is not built; pass leave_out='j' to do"),
+    (BOX.format(more=' stiffness="2"'),
+     "text:2: joint 'j' is ball and has a stiffness, which is not built; pass leave_out='j' to do"),
     (BOX.format(more=' armature="2"'), "text:2: joint 'j' is ball and has an armature, which is not built"),
     (pendulum(' springyield="2" stiffness="1"'), "text:3: joint 'hinge' has a plastic spring (springyield), which is not built"),
     (pendulum(' range="-1 1" limited="false"', '<actuator>\n<muscle name="biceps" joint="hinge" lengthrange="0 1"/></actuator>'),
      "text:5: actuator 'biceps' has the dynamics muscle, which is not built"),
     (pendulum("", '<actuator>\n<dcmotor name="dc" joint="hinge" motorconst="0.1 0.1" resistance="1"/></actuator>'),
      "text:5: actuator 'dc' has the dynamics dcmotor, which is not built"),
-    (pendulum("", WRAPPED.format(more=' stiffness="3"')), "text:5: tendon 'cord' wraps around geoms or pulleys, which is not built"),
+    (pendulum("", WRAPPED.format(more=' stiffness="3"')),
+     "text:5: tendon 'cord' wraps around geoms or pulleys, which is not built"),
     (pendulum("", WRAPPED.format(more="") + '<actuator><motor name="m" tendon="cord"/></actuator>'),
      "text:5: actuator 'm' pulls at a tendon that wraps around geoms or pulleys"),
     (pendulum("", '<option density="1.2"/>'), "text: the model moves in a fluid (density 1.2 kg/m^3, viscosity 0 Pa s)"),
     (pendulum("", '<extension><plugin plugin="mujoco.none"/></extension>'), "text:4: MuJoCo rejects the model in 'plugin'"),
     (pendulum("", '<include file="a.xml"/>'), "text:4: <include> has file='a.xml', and a text has no folder that files are in"),
     (f'<mujoco><worldbody><body name="b"><joint name="j" type="ball"/>{BALL}</body></worldbody><actuator>\n'
-     '<position name="p" joint="j"/></actuator></mujoco>', "text:2: actuator 'p' feeds back the length of something that has none"),
+     '<position name="p" joint="j"/></actuator></mujoco>',
+     "text:2: actuator 'p' feeds back the length of something that has none"),
 ])
 def test_faults_and_their_lines(text: str, fault: str) -> None:
     with pytest.raises(ModelError) as raised:

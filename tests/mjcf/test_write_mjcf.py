@@ -30,7 +30,8 @@ def every_joint() -> sd.System:
     turn = system.add_joint(sd.Revolute("turn", "cross", light, axis=[0, 1, 0], child_point=[0, 0.1, 0], parent_rotation=TILTED))
     system.add_joint(sd.Planar("plane", light, bodies["disc"], parent_rotation=TILTED, child_point=[0, 0, 0.1]))
     system.add_joint(sd.Cylindrical("sleeve", "disc", bodies["ring"], axis=[0, 0, 1], parent_point=[0.2, 0, 0]))
-    socket = system.add_joint(sd.Spherical("socket", "ring", bodies["ball"], orientation=sd.EulerParameters(), child_point=[0, 0, 0.1]))
+    socket = system.add_joint(sd.Spherical("socket", "ring", bodies["ball"], orientation=sd.EulerParameters(),
+                                           child_point=[0, 0, 0.1]))
     system.add_joint(sd.Free("fly", system.ground, bodies["flyer"], orientation=sd.EulerParameters()))
     system.add_joint(sd.Spherical("angles", "flyer", bodies["angled"], parent_rotation=TILTED))
     rotor = system.add_body("rotor", 0, [0.01, 0.01, 0.02])
@@ -103,7 +104,8 @@ def with_load(add: Callable[[sd.System, object], object]) -> sd.System:
 @pytest.mark.filterwarnings("ignore:.*violate the triangle inequality")
 @pytest.mark.parametrize(("system", "fault"), [
     (joined(sd.Helical("j", "ground", "b", pitch=0.1)), "joint 'j' is helical, which MJCF has no joint for"),
-    (joined(mass=0, inertia=[1, 0, 0]), "body 'b' has the mass 0 kg and the least moment of inertia 0 kg m^2; MuJoCo moves no body"),
+    (joined(mass=0, inertia=[1, 0, 0]),
+     "body 'b' has the mass 0 kg and the least moment of inertia 0 kg m^2; MuJoCo moves no body"),
     (joined(inertia=[1, 2, 3.5]), "body 'b' has the principal moments 1, 2, 3.5 kg m^2, the largest more than"),
     (joined(mass=sd.parameters("m")), "there is no number for m; add them to the defaults"),
     (joined(sd.Free("j", "ground", "b", orientation=sd.EulerParameters(), parent_point=[1, 0, 0])),
@@ -113,13 +115,15 @@ def with_load(add: Callable[[sd.System, object], object]) -> sd.System:
     (with_load(lambda s, q: s.add_joint_force("j", q**2)), "on joint 'j' is q_j**2; written are forces that are linear"),
     (with_load(lambda s, q: s.add_joint_force("j", 0.3)), "on joint 'j' is the constant 0.3 besides what is linear in q"),
     (with_load(lambda s, q: s.add_torque("b", [0, 0, 1])), "torque_1 is a load that MJCF has no words for"),
-    (with_load(lambda s, q: s.add_force_between("ground", "b", q, [1, 0, 0], [0, 1, 0])), "depends on the motion by a law of its own"),
+    (with_load(lambda s, q: s.add_force_between("ground", "b", q, [1, 0, 0], [0, 1, 0])),
+     "depends on the motion by a law of its own"),
     (with_load(lambda s, q: s.add_state(sd.coordinates("z"), q)), "it has extra states (z)"),
     (with_load(lambda s, q: s.add_event("e", q)), "it has events (e)"),
     (with_load(lambda s, q: s.set_speeds({sd.speeds("w"): 2 * q.dot})), "it has chosen speeds (w)"),
     (with_load(lambda s, q: s.move_ground([sd.t, 0, 0])), "it has a moving ground (ground)"),
     (with_load(lambda s, q: s.add_constraint(q.dot - 1, "v")), "the constraint 'v' is"),
-    (with_load(lambda s, q: s.close_loop(sd.Rod("r", "ground", "b", 1, [1, 0, 0], [0, 1, 0]))), "the loop 'r' is closed by a rod joint"),
+    (with_load(lambda s, q: s.close_loop(sd.Rod("r", "ground", "b", 1, [1, 0, 0], [0, 1, 0]))),
+     "the loop 'r' is closed by a rod joint"),
     (with_load(lambda s, q: [s.add_joint_force("j", sd.inputs("F"), "one"), s.add_joint_force("j", sd.inputs("F"), "two")]),
      "the input F drives several joints or loads"),
 ])

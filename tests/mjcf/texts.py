@@ -7,11 +7,14 @@ BALL = '<inertial pos="0.1 0.05 -0.2" quat="0.9 0.1 0.3 0.2" mass="1.5" diaginer
 # Several joints of one body, references, defaults, springs and damping of all kinds, armature, gravity compensation.
 JOINTS = f"""<mujoco model="joints"><compiler angle="degree" eulerseq="XYZ"/>
 <option gravity="0.5 -1 -9"/>
-<default><joint armature="0.02"/><default class="stiff"><joint stiffness="3 0.4 0.2" springref="10" damping="0.1 0.2 0.3"/></default></default>
+<default><joint armature="0.02"/><default class="stiff">
+<joint stiffness="3 0.4 0.2" springref="10" damping="0.1 0.2 0.3"/></default>
+</default>
 <worldbody>
 <body name="base" pos="0.1 0.2 1" euler="10 20 30"><joint name="x" type="slide" axis="1 0 0" ref="0.1" armature="0"/>
 <joint name="yaw" pos="0.1 0 0.05" axis="0 0 1" ref="15" class="stiff"/><joint name="pitch" axis="0 1 1"/>{BALL}
-<body name="arm" pos="0.3 0 0" axisangle="0 1 0 40" gravcomp="0.7"><joint name="lift" type="slide" axis="0 1 0" stiffness="7"/>{BALL}
+<body name="arm" pos="0.3 0 0" axisangle="0 1 0 40" gravcomp="0.7"><joint name="lift" type="slide" axis="0 1 0" stiffness="7"/>
+{BALL}
 <body name="top" pos="0 0.1 0.4"><joint name="socket" type="ball" pos="0 0 0.1" damping="0.2" armature="0"/>{BALL}</body>
 <body name="held" pos="0.1 0 0.4"><geom type="box" size="0.1 0.2 0.05" pos="0.1 0 0" mass="0.3"/></body></body></body>
 <body name="flyer" pos="1 0 1" quat="0.8 0.6 0 0"><joint name="fly" type="free" armature="0" damping="0.05"/>{BALL}</body>
@@ -44,7 +47,8 @@ CLOSED = f"""<mujoco model="closed"><worldbody>
 <body name="rod" pos="0.3 0 0"><joint name="pin" axis="0 1 0"/>{BALL}</body></body>
 <body name="rocker" pos="1 0 0"><joint name="rocker" axis="0 1 0"/>{BALL}<site name="s" pos="0 0 0.4"/></body>
 <body name="mate" pos="0 1 0"><freejoint name="mate"/>{BALL}</body>
-<body name="k" pos="0 2 0"><joint name="k1" axis="0 1 0" ref="0.2"/>{BALL}<body name="l" pos="0.2 0 0"><joint name="k2" axis="1 0 0"/>
+<body name="k" pos="0 2 0"><joint name="k1" axis="0 1 0" ref="0.2"/>{BALL}
+<body name="l" pos="0.2 0 0"><joint name="k2" axis="1 0 0"/>
 <joint name="k3" axis="0 0 1"/>{BALL}</body></body></worldbody>
 <tendon><fixed name="t1"><joint joint="k2" coef="2"/></fixed><fixed name="t2"><joint joint="k3" coef="-1"/></fixed></tendon>
 <equality><connect name="tip" body1="rod" body2="rocker" anchor="0.7 0 0.1"/>
@@ -57,4 +61,5 @@ HINGE = '<joint name="hinge" axis="0 1 0"{more}/><geom type="sphere" size="0.1" 
 
 def pendulum(more: str = "", rest: str = "") -> str:
     """One body on a hinge; more: attributes of the joint; rest: elements of the model."""
-    return f'<mujoco model="pendulum">\n<worldbody><body name="bar">\n{HINGE.format(more=more)}</body></worldbody>\n{rest}</mujoco>'
+    body = f'<body name="bar">\n{HINGE.format(more=more)}</body>'
+    return f'<mujoco model="pendulum">\n<worldbody>{body}</worldbody>\n{rest}</mujoco>'

@@ -12,7 +12,8 @@ import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
 
 pytest.importorskip("defusedxml", reason="defusedxml is not installed; run: pip install 'symdyn[robots]'")
-INERTIAL = ("<inertial><pose>0.1 -0.2 0.3 0.3 -0.4 0.5</pose><mass>2.5</mass><inertia><ixx>0.05</ixx><ixy>0.002</ixy><ixz>-0.003</ixz>"
+INERTIAL = ("<inertial><pose>0.1 -0.2 0.3 0.3 -0.4 "
+            "0.5</pose><mass>2.5</mass><inertia><ixx>0.05</ixx><ixy>0.002</ixy><ixz>-0.003</ixz>"
             "<iyy>0.06</iyy><iyz>0.004</iyz><izz>0.07</izz></inertia></inertial>")
 
 
@@ -63,13 +64,15 @@ def from_urdf(path: Path) -> str:
         zero = "<ixx>0</ixx><iyy>0</iyy><izz>0</izz>"
         carrier = carried.get(one.attrib["name"])
         place = "" if carrier is None else f'<pose relative_to="{carrier}"/>'
-        lines.append(f'<link name="{one.attrib["name"]}">{place}<inertial>{at}<mass>{mass}</mass><inertia>{entries or zero}</inertia>'
-                     "</inertial></link>")
+        weight = f"<mass>{mass}</mass><inertia>{entries or zero}</inertia>"
+        lines.append(f'<link name="{one.attrib["name"]}">{place}<inertial>{at}{weight}</inertial></link>')
     for one in robot.findall("joint"):
         ends = [one.find(end).attrib["link"] for end in ("parent", "child")]
         relative = f' relative_to="{ends[0]}"'
-        lines.append(joint(one.attrib["name"], one.attrib["type"], *ends, pose(one, relative) + axis(one.find("axis").attrib["xyz"])))
-    return f'<sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>{model(*lines)[19:].removesuffix("</sdf>")}</world></sdf>'
+        lines.append(joint(one.attrib["name"], one.attrib["type"], *ends, pose(one, relative) +
+                           axis(one.find("axis").attrib["xyz"])))
+    inner = model(*lines)[19:].removesuffix("</sdf>")
+    return f'<sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>{inner}</world></sdf>'
 
 
 @pytest.mark.parametrize("n", [3, 6])
@@ -82,10 +85,12 @@ def test_a_chain_moves_as_that_of_the_urdf(tmp_path: Path, n: int) -> None:
 
 
 def test_poses_by_hand(tmp_path: Path) -> None:
-    """A link turned by 90 degrees about z at (1, 0, 0), a joint 0.5 along its x, the world's (1, 0.5, 0), axis along the model's x."""
+    """A link turned by 90 degrees about z at (1, 0, 0), a joint 0.5 along its x, the model's (1, 0.5, 0), axis along the model's
+    x."""
     text = model('<frame name="f" attached_to="a"><pose degrees="true">0.5 0 0 0 0 -90</pose></frame>',
                  link("a", '<pose>1 0 0 0 0 1.5707963267948966</pose>'), link("b", '<pose relative_to="f">0 0 2 0 0 0</pose>'),
-                 joint("hinge", "revolute", "f", "b", '<pose relative_to="f"/>' + axis("1 0 0", attributes=' expressed_in="__model__"')),
+                 joint("hinge", "revolute", "f", "b", '<pose relative_to="f"/>' + axis("1 0 0",
+                                                                                       attributes=' expressed_in="__model__"')),
                  attributes=' canonical_link="a"')
     system = sd.read_sdf(saved(tmp_path, text), root="fixed")
     placed = {j.name: j for j in system.check().joints}
@@ -100,7 +105,8 @@ def test_poses_by_hand(tmp_path: Path) -> None:
 
 
 def test_nested_models_and_quaternions(tmp_path: Path) -> None:
-    nested = ('<model name="in"><pose rotation_format="quat_xyzw">0 1 0 0 0 0.6 0.8</pose><link name="l"><pose>1 0 0 0 0 0</pose></link>'
+    nested = ('<model name="in"><pose rotation_format="quat_xyzw">0 1 0 0 0 0.6 0.8</pose><link name="l"><pose>1 0 0 0 0 '
+              '0</pose></link>'
               '<link name="k"/>' + joint("w", "fixed", "l", "k") + "</model>")
     text = model(nested, link("base"), joint("j", "prismatic", "base", "in::l", axis("0 0 1")))
     placed = {j.name: j for j in sd.read_sdf(saved(tmp_path, text), root="fixed").check().joints}
@@ -119,12 +125,14 @@ def test_axes_of_old_versions_are_in_the_models_frame(tmp_path: Path) -> None:
 
 
 def test_loops_forces_and_free_models(tmp_path: Path) -> None:
-    text = model(link("a"), link("b"), link("c"), joint("u", "universal", "a", "b", axis("1 0 0", "<dynamics><damping>0.2</damping>"
+    text = model(link("a"), link("b"), link("c"), joint("u", "universal", "a", "b", axis("1 0 0",
+                                                                                         "<dynamics><damping>0.2</damping>"
                  "</dynamics>") + "<axis2><xyz>0 1 0</xyz></axis2>"), joint("s", "ball", "b", "c"),
                  joint("back", "ball", "a", "c", "<pose>0.5 0 0 0 0 0</pose>"), '<pose>0 0 2 0 0 0</pose>')
     system = sd.read_sdf(saved(tmp_path, text), symbolic=["d_*"])
     checked = system.check()
-    assert [str(q) for q in checked.coordinates] == ["x_a", "y_a", "z_a", "e0_a", "e1_a", "e2_a", "e3_a", "q_u_1", "q_u_2", "e0_s",
+    assert [str(q) for q in checked.coordinates] == ["x_a", "y_a", "z_a", "e0_a", "e1_a", "e2_a", "e3_a", "q_u_1", "q_u_2",
+                                                     "e0_s",
                                                      "e1_s", "e2_s", "e3_s"]
     assert [j.name for j in system.loops] == ["back"] and {str(s): v for s, v in system.defaults.items()} == {"d_u": 0.2}
     start = {str(s): v for s, v in checked.initial.items()}
@@ -135,7 +143,8 @@ def test_mimic_spring_weight_static(tmp_path: Path) -> None:
     spring = "<dynamics><spring_stiffness>3</spring_stiffness><spring_reference>0.1</spring_reference></dynamics>"
     mimic = '<mimic joint="q"><multiplier>2</multiplier><offset>0.3</offset><reference>0.1</reference></mimic>'
     text = model(link("base"), link("a"), link("b", INERTIAL + "<gravity>false</gravity>"),
-                 joint("q", "prismatic", "base", "a", axis("0 0 1", spring)), joint("m", "revolute", "a", "b", axis("0 1 0", mimic)),
+                 joint("q", "prismatic", "base", "a", axis("0 0 1", spring)), joint("m", "revolute", "a", "b", axis("0 1 0",
+                                                                                                                    mimic)),
                  "<static>true</static>")
     system = sd.read_sdf(saved(tmp_path, text))
     q, = sd.coordinates("q_q,")
@@ -158,18 +167,23 @@ BASE = link("a")
     (model(link("a", '<pose frame="x">0 0 0 0 0 0</pose>')), "2: link 'a': <pose> has the attribute frame='x'"),
     (model(link("a", "<pose>0 0 0</pose>")), "2: link 'a': text of <pose> is '0 0 0'; give 6 numbers"),
     (model(link("a", "<pose>0 0 0 0 0 ${x}</pose>")), "2: link 'a': text of <pose> is '0 0 0 0 0 ${x}'; give 6 numbers"),
-    (model(link("a", '<pose rotation_format="angles">0 0 0 0 0 0</pose>')), "2: link 'a': <pose> has the rotation_format 'angles'"),
-    (model(link("a", '<pose rotation_format="quat_xyzw">0 0 0 0 0 0 2</pose>')), "2: link 'a': the quaternion of <pose> has the length 2"),
+    (model(link("a", '<pose rotation_format="angles">0 0 0 0 0 0</pose>')),
+     "2: link 'a': <pose> has the rotation_format 'angles'"),
+    (model(link("a", '<pose rotation_format="quat_xyzw">0 0 0 0 0 0 2</pose>')),
+     "2: link 'a': the quaternion of <pose> has the length 2"),
     (model(link("a", '<pose relative_to="none"/>')), "2: link 'a' refers to the frame 'none', which there is not"),
-    (model(link("a", '<pose relative_to="b"/>'), link("b", '<pose relative_to="a"/>')), "2: the poses of 'a', 'b' are relative to each"),
+    (model(link("a", '<pose relative_to="b"/>'), link("b", '<pose relative_to="a"/>')),
+     "2: the poses of 'a', 'b' are relative to each"),
     (model(link("a", "<kinematic>true</kinematic>")), "2: link 'a' is kinematic"),
     (model(link("a", '<inertial auto="true"/>')), "2: link 'a': its inertia is to follow from its collisions"),
     (model(link("a", "<inertial><fluid_added_mass/></inertial>")), "2: link 'a' has an added mass of a fluid"),
     (model(link("a", "<inertial><mass>-1</mass></inertial>")), "2: link 'a' has the mass -1.0 kg"),
     (model(link("a", '<inertial><pose relative_to="b"/></inertial>')), "2: link 'a': the pose of its inertia is relative to 'b'"),
-    (model(link("a", "<inertial><inertia><ixy>5</ixy></inertia></inertial>")), "2: link 'a': its inertia has the principal moment -4"),
+    (model(link("a", "<inertial><inertia><ixy>5</ixy></inertia></inertial>")),
+     "2: link 'a': its inertia has the principal moment -4"),
     (model(BASE, joint("j", "gearbox", "world", "a")), "3: joint 'j' has the type 'gearbox'; read are fixed, revolute"),
-    (model(BASE, '<joint name="j" type="ball"><child>a</child></joint>'), "3: joint 'j' has no <parent>; write <parent>...</parent>"),
+    (model(BASE, '<joint name="j" type="ball"><child>a</child></joint>'),
+     "3: joint 'j' has no <parent>; write <parent>...</parent>"),
     (model(BASE, joint("j", "ball", "b", "a")), "3: joint 'j' refers to 'b', which is no link or frame"),
     (model(BASE, joint("j", "ball", "a", "world")), "3: joint 'j' has the child world; make the world its parent"),
     (model(BASE, joint("j", "revolute", "world", "a")), "3: joint 'j' is revolute and has no <axis>"),
@@ -177,11 +191,14 @@ BASE = link("a")
     (model(BASE, joint("j", "universal", "world", "a", axis("0 0 1") + "<axis2><xyz>0 0 1</xyz></axis2>")),
      "3: joint 'j' has two parallel axes"),
     (model(BASE, link("b"), joint("j", "ball", "a", "b"), joint("k", "ball", "b", "a")), "4: joints 'j', 'k' hang on each other"),
-    (model(BASE, joint("j", "revolute", "world", "a", axis("0 0 1", '<mimic joint="x"/>'))), "3: joint 'j' mimics 'x', which has no"),
-    (model(BASE, joint("j", "revolute", "world", "a", axis("0 0 1", '<mimic joint="x" axis="axis2"/>'))), "3: joint 'j' mimics a second"),
+    (model(BASE, joint("j", "revolute", "world", "a", axis("0 0 1", '<mimic joint="x"/>'))),
+     "3: joint 'j' mimics 'x', which has no"),
+    (model(BASE, joint("j", "revolute", "world", "a", axis("0 0 1", '<mimic joint="x" axis="axis2"/>'))),
+     "3: joint 'j' mimics a second"),
     (model('<frame name="f" attached_to="g"/>', '<frame name="g" attached_to="f"/>', BASE, joint("j", "ball", "f", "a")),
      "5: joint 'j' is attached in a circle"),
-    (model(BASE, '<model name="in" placement_frame="l"><link name="l"/></model>'), "3: model 'in' is nested and has a placement_frame"),
+    (model(BASE, '<model name="in" placement_frame="l"><link name="l"/></model>'),
+     "3: model 'in' is nested and has a placement_frame"),
     ("<!DOCTYPE x><sdf/>", "1: the file declares a document type, which is rejected"),
 ])
 def test_faults_and_their_lines(tmp_path: Path, text: str, fault: str) -> None:
@@ -203,7 +220,8 @@ def test_what_is_not_taken_is_reported(tmp_path: Path) -> None:
 
 def test_arguments(tmp_path: Path) -> None:
     path = saved(tmp_path, model(BASE))
-    for given, fault in (({"fixed": "none"}, "fixed has 'none', which fits no joint"), ({"symbolic": "m_b"}, "symbolic has 'm_b'"),
+    for given, fault in (({"fixed": "none"}, "fixed has 'none', which fits no joint"), ({"symbolic": "m_b"},
+                                                                                        "symbolic has 'm_b'"),
                          ({"leave_out": "none"}, "leave_out has 'none'; there are contacts, limits, friction, plugins")):
         with pytest.raises(ModelError, match=fault):
             sd.read_sdf(path, **given)

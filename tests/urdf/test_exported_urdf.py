@@ -88,23 +88,27 @@ ONSHAPE = """<?xml version="1.0" ?>
 <!-- Generated using onshape-to-robot -->
 <!-- Onshape https://cad.example/documents/1 -->
 <robot name="leg" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <link name="world_dummy"><inertial><origin xyz="0 0 0" rpy="0 -0 0"/><mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0"
-   izz="0"/></inertial></link>
-  <joint name="base_free" type="floating"><origin xyz="0 0 0.3" rpy="0 0 0"/><parent link="world_dummy"/><child link="body"/></joint>
-  <link name="body"><inertial><origin xyz="0.01 0 0" rpy="0 0 0"/><mass value="1.2"/><inertia ixx="0.01" ixy="1e-05" ixz="0" iyy="0.02"
+  <link name="world_dummy"><inertial><origin xyz="0 0 0" rpy="0 -0 0"/><mass value="0"/>
+   <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+  <joint name="base_free" type="floating"><origin xyz="0 0 0.3" rpy="0 0 0"/>
+   <parent link="world_dummy"/><child link="body"/></joint>
+  <link name="body"><inertial><origin xyz="0.01 0 0" rpy="0 0 0"/><mass value="1.2"/>
+   <inertia ixx="0.01" ixy="1e-05" ixz="0" iyy="0.02"
    iyz="0" izz="0.02"/></inertial>
    <!-- Part body --><visual><origin xyz="0 0 0" rpy="0 0 0"/><geometry><mesh filename="package://assets/body.stl"/></geometry>
    <material name="body_material"><color rgba="0.2 0.4 0.6 1.0"/></material></visual></link>
   <link name="tip_frame"/>
   <joint name="tip_frame_joint" type="fixed"><origin xyz="0 0 -0.2" rpy="0 0 0"/><parent link="shin"/><child link="tip_frame"/>
    <axis xyz="0 0 0"/></joint>
-  <link name="shin"><inertial><origin xyz="0 0 -0.1" rpy="0 0 0"/><mass value="0.3"/><inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001"
+  <link name="shin"><inertial><origin xyz="0 0 -0.1" rpy="0 0 0"/><mass value="0.3"/>
+   <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001"
    iyz="0" izz="0.0001"/></inertial></link>
   <joint name="knee" type="revolute"><origin xyz="0 0 -0.05" rpy="1.5708 -0 3.14159"/><parent link="body"/><child link="shin"/>
    <axis xyz="0 0 1"/><joint_properties friction="0.0"/></joint>
-  <link name="claw"><inertial><mass value="0.1"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial></link>
-  <joint name="claw" type="prismatic"><parent link="shin"/><child link="claw"/><axis xyz="1 0 0"/><mimic joint="knee" multiplier="0.02"/>
-   </joint>
+  <link name="claw"><inertial><mass value="0.1"/>
+   <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial></link>
+  <joint name="claw" type="prismatic"><parent link="shin"/><child link="claw"/><axis xyz="1 0 0"/>
+   <mimic joint="knee" multiplier="0.02"/></joint>
 </robot>"""
 
 
@@ -113,7 +117,8 @@ def triangles() -> str:
     vertices, faces = ellipsoid(np.ones(3))
     rows = ["solid ball"]
     for face in faces:
-        rows += ["facet normal 0 0 0", "outer loop", *[f"vertex {x:.6g} {y:.6g} {z:.6g}" for x, y, z in vertices[face]], "endloop",
+        rows += ["facet normal 0 0 0", "outer loop", *[f"vertex {x:.6g} {y:.6g} {z:.6g}" for x, y, z in vertices[face]],
+                 "endloop",
                  "endfacet"]
     return "\n".join([*rows, "endsolid ball"])
 
@@ -134,8 +139,10 @@ def test_a_file_of_onshape(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "fault"), [
-    ('<mass value="1.2"/>', '<mass value="${m}"/>', "link 'body': value of <mass> is '${m}'; give a number, finite and written out; it"),
-    ('<link name="tip_frame"/>', '<xacro:include filename="x"/>', "<xacro:include> is left over from xacro; run the file through xacro"),
+    ('<mass value="1.2"/>', '<mass value="${m}"/>',
+     "link 'body': value of <mass> is '${m}'; give a number, finite and written out; it"),
+    ('<link name="tip_frame"/>', '<xacro:include filename="x"/>',
+     "<xacro:include> is left over from xacro; run the file through xacro"),
     ('<joint name="knee" type="revolute">', '<joint name="knee" type="ball">', "joint 'knee' has the type 'ball'"),
     ('<mass value="0.3"/>', "", "<inertial> has no <mass>; add it"),
 ])
@@ -183,7 +190,8 @@ def test_solids(tmp_path: Path, geometry: str, low: tuple[float, ...], high: tup
 
 @pytest.mark.parametrize(("geometry", "fault"), [
     ('<mesh filename="../x.stl"/>', "the mesh '../x.stl' is outside of the folder"),
-    ('<mesh filename="x.stl"/>', "there is no mesh 'x.stl'"), ("<cone/>", "has a <cone>; read are box, sphere, cylinder and mesh"),
+    ('<mesh filename="x.stl"/>', "there is no mesh 'x.stl'"), ("<cone/>",
+                                                               "has a <cone>; read are box, sphere, cylinder and mesh"),
     ("", "<visual> has no <geometry>"), ('<mesh filename="odd.stl"/>', "the mesh 'odd.stl' "),
     ('<mesh filename="odd.step"/>', "is of the format step; read are stl, obj, dae"),
     ('<mesh filename="empty.obj"/>', "the mesh 'empty.obj' "), ("<mesh/>", "<visual> has no filename"),
@@ -211,7 +219,8 @@ def test_without_trimesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_no_more_triangles_than_the_eye_sees() -> None:
     angles = np.linspace(0, 2 * np.pi, 200)
-    grid = np.array([[np.cos(a) * (2 + np.cos(b)), np.sin(a) * (2 + np.cos(b)), np.sin(b)] for a in angles[:-1] for b in angles[:-1]])
+    grid = np.array([[np.cos(a) * (2 + np.cos(b)), np.sin(a) * (2 + np.cos(b)), np.sin(b)] for a in angles[:-1] for b in
+                     angles[:-1]])
     at = np.arange(199 * 199).reshape(199, 199)
     a, b, c, d = (np.roll(at, s, axis=(0, 1)).ravel() for s in ((0, 0), (1, 0), (1, 1), (0, 1)))
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
@@ -227,7 +236,8 @@ def test_no_more_triangles_than_the_eye_sees() -> None:
 
 
 @pytest.mark.parametrize(("shape", "fault"), [
-    (sd.shapes.Mesh([[0, 0]], [[0, 0, 0]]), "pass finite numbers, (n, 3)"), (sd.shapes.Mesh("x", [[0, 0, 0]]), "pass finite numbers"),
+    (sd.shapes.Mesh([[0, 0]], [[0, 0, 0]]), "pass finite numbers, (n, 3)"), (sd.shapes.Mesh("x", [[0, 0, 0]]),
+                                                                             "pass finite numbers"),
     (sd.shapes.Mesh([[0, 0, 0]], [[0, 0, 1]]), "pass (m, 3) indices from 0 to 0"),
     (sd.shapes.Mesh([[0, 0, 0]], [[0, 0, 0.5]]), "pass (m, 3) indices"),
     (sd.shapes.Mesh(np.zeros((20_001, 3)), [[0, 0, 0]]), "it has 20001 vertices; pass 20000 at most")])

@@ -122,7 +122,8 @@ class MujocoRobot:
                 rows.append(self._bodies(e, int(m.eq_type[e]) == int(kinds.mjEQ_WELD)))
             else:
                 rows.append(self._coupling(e, int(m.eq_type[e]) == int(kinds.mjEQ_TENDON)))
-        residual, J, rest = (np.concatenate([np.atleast_1d(row[k]) for row in rows]) if k != 1 else np.vstack([row[1] for row in rows])
+        residual, J, rest = (np.concatenate([np.atleast_1d(row[k]) for row in rows]) if k != 1 else np.vstack([row[1] for row
+                                                                                                               in rows])
                              for k in range(3))
         return residual, J, rest
 
