@@ -63,7 +63,7 @@ class Equalities:
             return
         # A hinge holds two points of its axis.
         for k in range(2 if isinstance(loop, Revolute) and not self.model.planar else 1):
-            along = [0, 0, 0] if k == 0 else list(loop.axis)
+            along = list(loop.axis) if k and isinstance(loop, Revolute) else [0, 0, 0]
             first, second = (self.site(body, sp.Matrix(point) + sp.Matrix(R) * sp.Matrix(along)) for body, point, R in ends)
             name = loop.name if k == 0 else f"{loop.name} 2"
             yield f'<connect name={quoteattr(name)} site1="{first}" site2="{second}"/>'

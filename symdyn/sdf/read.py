@@ -113,7 +113,7 @@ class _Builder:
 
     def system(self, root: str) -> System:
         model, system = self.model, self.built
-        ends = {j.name: tuple(model.frames.body(end, j.line, f"joint {shown(j.name)}") for end in (j.parent, j.child))
+        ends = {j.name: [model.frames.body(end, j.line, f"joint {shown(j.name)}") for end in (j.parent, j.child)]
                 for j in model.joints.values()}
         for link in model.links.values():
             model.frames.pose(link.name, link.line, f"link {shown(link.name)}")
@@ -144,7 +144,7 @@ class _Builder:
             found = next((j for link, j in carrying.items() if link not in reached and ends[j.name][0] in reached), None)
             if found is None:
                 break
-            self._join(found, *ends[found.name], loop=False)
+            self._join(found, ends[found.name], loop=False)
             reached.add(ends[found.name][1])
         left = [j for link, j in carrying.items() if link not in reached]
         if left:
@@ -153,7 +153,7 @@ class _Builder:
                                          "links to the world or to the rest")
             return system
         for joint in loops:
-            self._join(joint, *ends[joint.name], loop=True)
+            self._join(joint, ends[joint.name], loop=True)
         system.set_defaults(self.parameters.defaults)
         return system
 
@@ -203,7 +203,8 @@ class _Builder:
         made: Coordinate = coordinates(self.names.symbol(f"{letters}_{owner}"))
         return made
 
-    def _join(self, joint: SdfJoint, parent: str, child: str, loop: bool) -> None:
+    def _join(self, joint: SdfJoint, carried: list[str], loop: bool) -> None:
+        parent, child = carried
         frames, what = self.model.frames, f"joint {shown(joint.name)}"
         if parent == WORLD:
             on_parent = self.model.pose @ frames.pose(joint.name, joint.line, what)
@@ -235,8 +236,10 @@ class _Builder:
                 turned = frames.between(joint.name, axis.frame, axis.line, what).R @ turned
             axes.append([plain(float(v)) for v in np.where(np.abs(turned) < 1e-15, 0.0, turned)])
         if joint.kind == "ball":
-            own = None if loop else [self._coordinate(f"e{k}", joint.name) for k in range(4)]
-            return Spherical(label, *ends, own, **placed, **({} if loop else {"orientation": EulerParameters()}))
+            if loop:
+                return Spherical(label, *ends, **placed)
+            own = [self._coordinate(f"e{k}", joint.name) for k in range(4)]
+            return Spherical(label, *ends, own, EulerParameters(), **placed)
         if len(axes) == 2:
             if np.linalg.norm(np.cross(np.array(axes[0], dtype=float), np.array(axes[1], dtype=float))) < 1e-9:
                 self.faults.at(joint.line, f"{what} has two parallel axes; give axes at an angle, or one revolute joint")

@@ -29,7 +29,9 @@ class Visuals:
         materials = {e.attributes.get("name"): e for e in root.all("material")}
         for link in root.all("link"):
             body = bodies.get(link.attributes.get("name", "").strip())
-            for visual in link.all("visual") if body is not None else ():
+            if body is None:
+                continue
+            for visual in link.all("visual"):
                 what = f"link {shown(link.attributes['name'])}: <visual>"
                 found = self._triangles(visual.find("geometry"), visual, what)
                 if found is None:

@@ -59,9 +59,9 @@ class MujocoRobot:
         m, worst = self.m, 0.0
         bodies = {b.name: b for b in self.source.bodies}
         for k in range(1, m.nbody):
-            body, R = bodies[self.c.name("body", k)], np.zeros(9)
-            self.mj.mju_quat2Mat(R, m.body_iquat[k])
-            R = R.reshape(3, 3)
+            body, flat = bodies[self.c.name("body", k)], np.zeros(9)
+            self.mj.mju_quat2Mat(flat, m.body_iquat[k])
+            R = flat.reshape(3, 3)
             wanted = [np.array([m.body_mass[k]]), m.body_ipos[k], R @ np.diag(m.body_inertia[k]) @ R.T]
             found = [np.array([float(body.mass)]), np.array(body.com, dtype=float).ravel(), np.array(body.inertia, dtype=float)]
             for a, b in zip(found, wanted, strict=True):
