@@ -100,7 +100,8 @@ class _Writer:
         for what, given in (("extra states", [z.symbol.name for z in model.states]), ("events", [e.name for e in model.events]),
                             ("a moving ground", ["ground"] if model.ground_motion is not None else []),
                             ("chosen speeds", [u.name for u, _ in model.chosen]),
-                            ("contacts", [getattr(c, "name", "contact") for c in (*model.contacts, *model.compliant, *model.groups)])):
+                            ("contacts", [getattr(c, "name", "contact")
+                                          for c in (*model.contacts, *model.compliant, *model.groups)])):
             if given:
                 self.faults.append(f"it has {what} ({', '.join(map(str, given))}), which are not written as MJCF; leave them out")
         known = (Fixed, Free, Spherical)
