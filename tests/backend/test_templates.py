@@ -114,7 +114,7 @@ def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Pa
     mine, usual = (emit(derived("pendulum"), "c", templates=t).files for t in (tmp_path, None))
     assert mine["main.c"] == "// pendulum has 1 coordinates\nint main(void) { return 0; }\n"
     assert {n: t for n, t in mine.items() if n != "main.c"} == {n: t for n, t in usual.items() if n != "main.c"}
-    assert backends(tmp_path) == ["c", "javascript", "numpy", "python"]
+    assert backends(tmp_path) == ["c", "fortran", "javascript", "julia", "matlab", "numpy", "python", "rust"]
 
 
 def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
@@ -154,10 +154,10 @@ def failure(equations: Any, backend: str, templates: Any) -> str:
 def test_missing_folder_dialect_or_backend(derived: Callable[..., Any], folder: Path) -> None:
     equations = derived("pendulum")
     assert "/no/such/folder does not exist" in failure(equations, "c", "/no/such/folder")
-    assert "no backend 'fortran'; there are c, ecmascript, javascript, numpy, python; a folder with a dialect.toml" in failure(
-        equations, "fortran", folder)
+    known = "fortran, javascript, julia, matlab, numpy, python, rust"
+    assert f"no backend 'ada'; there are c, ecmascript, {known}; a folder with a dialect" in failure(equations, "ada", folder)
     (folder / "ecmascript" / "dialect.toml").unlink()
-    assert "no backend 'ecmascript'; there are c, javascript, numpy, python" in failure(equations, "ecmascript", folder)
+    assert f"no backend 'ecmascript'; there are c, {known}" in failure(equations, "ecmascript", folder)
 
 
 @pytest.mark.parametrize(("line", "broken", "message"), [
