@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symdyn.errors import ArgumentError
 from symdyn.folders import templates_folder
 
 if TYPE_CHECKING:
     import jinja2
+
+
+# More rows than this are counted.
+ROWS = 12
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table of a notebook's page, HTML; the first rows of many."""
+    cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows[:ROWS])
+    more = f'<tr><td colspan="{len(head)}">and {len(rows) - ROWS} more</td></tr>' if len(rows) > ROWS else ""
+    return (f"<table><thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in head)}</tr></thead>"
+            f"<tbody>{cells}{more}</tbody></table>")
+
+
+def titled(thing: object, *tables: str) -> str:
+    """What a notebook shows of an object: how it prints, then tables."""
+    return f"<div><b>{escape(repr(thing))}</b>{''.join(tables)}</div>"
 
 
 def page_environment() -> jinja2.Environment:

@@ -14,6 +14,7 @@ from symdyn.counting import counted
 from symdyn.ensembles.archive import reading
 from symdyn.ensembles.store import RESULT, Failure, read_failures
 from symdyn.errors import ArgumentError
+from symdyn.pages import table, titled
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -96,3 +97,10 @@ class Ensemble:
     def __repr__(self) -> str:
         failed = f", {self.n_failed} failed" if self.n_failed else ""
         return f"<Ensemble of {self.name}: {counted(self.count, 'member')}{failed}, {', '.join(self.labels)} in {self.file}>"
+
+    def _repr_html_(self) -> str:
+        """Mean, deviation and extremes of the outcomes that are numbers, as a notebook shows them."""
+        good = ~self.failed
+        rows = [(label, *(f"{v:.6g}" for v in (values.mean(), values.std(), values.min(), values.max())))
+                for label in self.labels if not self.shapes[label] and len(values := self[label][good])]
+        return titled(self, table(("outcome", "mean", "deviation", "least", "most"), rows))

@@ -19,6 +19,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.kinds import text
+from symdyn.pages import table, titled
 from symdyn.real_numbers import DOUBLE, number_of, real_of
 from symdyn.runtime.building.library import Evaluator, Unit
 from symdyn.runtime.calls import Call, ordered
@@ -1159,6 +1160,15 @@ class Module:
         sizes = self.metadata.sizes
         what = ", ".join(counted(n, one) for n, one in ((sizes.q, "coordinate"), (sizes.u, "speed"), (sizes.p, "parameter")))
         return f"<Module {self.name}: {self.backend}, {what}>"
+
+    def _repr_html_(self) -> str:
+        """Its states and parameters with units and numbers, as a notebook shows them."""
+        about = self.metadata
+        states = [(name, about.units.get(name, ""), f"{about.initial.get(name, 0.0):.6g}") for name in about.x]
+        numbers = [(name, about.units.get(name, ""), "" if value is None else f"{value:.6g}")
+                   for name, value in zip(about.parameters, about.defaults, strict=True)]
+        tables = [(("state", "unit", "start"), states), (("parameter", "unit", "default"), numbers)]
+        return titled(self, *[table(head, rows) for head, rows in tables if rows])
 
 
 class BoundModule:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from symdyn.errors import ModelError, SymdynError
+from symdyn.pages import table
 from symdyn.shown import name_of
 from symdyn.viewer.live import mechanism_of
 from symdyn.viewer.still import picture_of
@@ -14,9 +14,6 @@ from symdyn.viewer.still import picture_of
 if TYPE_CHECKING:
     from symdyn.model.record import Model
     from symdyn.model.system import System
-
-# More rows than this are counted.
-_ROWS = 12
 
 
 def summary_of(system: System) -> str:
@@ -44,11 +41,5 @@ def _tables(model: Model) -> str:
     rows = [(j.name, j.kind, f"{name_of(j.parent)} → {name_of(j.child)}", ", ".join(map(str, j.coordinates)))
             for j in model.joints]
     numbers = [(p, f"{model.defaults[p]:.6g}" if p in model.defaults else "", model.units.get(p, "")) for p in model.parameters]
-    return (_table(("body", "mass", "centre of mass"), bodies) + _table(("joint", "kind", "between", "coordinates"), rows)
-            + (_table(("parameter", "value", "unit"), numbers) if numbers else ""))
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows[:_ROWS])
-    more = f'<tr><td colspan="{len(head)}">and {len(rows) - _ROWS} more</td></tr>' if len(rows) > _ROWS else ""
-    return f"<table><thead><tr>{''.join(f'<th>{name}</th>' for name in head)}</tr></thead><tbody>{cells}{more}</tbody></table>"
+    return (table(("body", "mass", "centre of mass"), bodies) + table(("joint", "kind", "between", "coordinates"), rows)
+            + (table(("parameter", "value", "unit"), numbers) if numbers else ""))

@@ -18,6 +18,7 @@ from symdyn.arguments import fixed
 from symdyn.backend.metadata import Sizes
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.pages import table, titled
 from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.inputs.sampled import SampleRows
@@ -815,3 +816,10 @@ class Solution:
         end = f" to t = {self.t[-1]:.6g} s" if len(self.t) else ""
         return (f"<Solution of {self.module.name}: {counted(len(self.t), 'time')}{end}, {counted(self.n_steps, 'step')}, "
                 f"{self.method} on {self.backend}: {self.message}>")
+
+    def _repr_html_(self) -> str:
+        """Where every column starts and ends, and its extremes, as a notebook shows them."""
+        units = self.module.metadata.units
+        rows = [(name, units.get(name, ""), *(f"{v:.6g}" for v in (values[0], values[-1], values.min(), values.max())))
+                for name, values in zip(*self.columns(), strict=True)] if len(self.t) else []
+        return titled(self, table(("", "unit", "start", "end", "least", "most"), rows[1:]))
