@@ -156,8 +156,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         lanes = on_vectors() if batch and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
-    context = _context(content, program, dialect, standalone, integrator, lanes, method, 0 if only else states)
-    context = _context(content, program, dialect, standalone, integrator, lanes, many, method, states)
+    context = _context(content, program, dialect, standalone, integrator, lanes, many, method, 0 if only else states)
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
