@@ -521,7 +521,7 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["simulat", "pendulum"], "there is no command 'simulat'; did you mean simulate"),
     (["xyz"], "there is no command 'xyz'; there are list, schema, derive,"),
     (["export", "pendulum"], "nothing to export: pass one of --casadi, --jax, --torch"),
-    (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, fortran, javascript"),
+    (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, firmware, fortran, javascript"),
     (["generate", "pendulum", "--functions", "lhs"], "no function lhs; it has rhs"),
     (["generate", "pendulum", "--templates", "absent"], "template folder absent does not exist"),
     (["simulate", "pendulum", "--set", "mm=1"], "there is no 'mm', did you mean m?"),

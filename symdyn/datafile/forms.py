@@ -23,13 +23,13 @@ from symdyn.model.system import System
 # Argument -> the kind of its value, see `KINDS`; an entry "Class.argument" takes precedence.
 ARGUMENTS = {
     **dict.fromkeys(("name", "law", "impact", "angles", "velocity", "sequence"), "text"),
-    **dict.fromkeys(("seabed", "carries", "stop"), "flag"),
+    **dict.fromkeys(("seabed", "carries", "stop", "located"), "flag"),
     **dict.fromkeys(("parent", "child", "body", "body_a", "body_b", "a", "b", "reaction", "frame"), "body"),
     **dict.fromkeys(("joint", "joint_a", "joint_b", "other"), "joint"),
     **dict.fromkeys(("coordinate", "mass", "stiffness", "damping", "length", "pitch", "ratio", "offset", "density", "area",
                      "coefficient", "weight", "friction", "restitution", "width", "breakaway", "sliding", "lower", "upper",
                      "radius", "height", "frequency", "ramp", "gravity", "exponent", "dissipation", "slip_speed", "stribeck",
-                     "viscous", "elastic", "depth", "value", "rate", "expression"), "expression"),
+                     "viscous", "elastic", "depth", "value", "rate", "expression", "ignored"), "expression"),
     **dict.fromkeys(("coordinates", "force", "torque", "amplitude", "phase", "reference"), "expressions"),
     **dict.fromkeys(("axis", "parent_point", "child_point", "point", "point_a", "point_b", "position", "wind", "anchor",
                      "fairlead", "com", "center", "size", "at", "normal"), "vector"),

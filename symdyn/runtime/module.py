@@ -765,7 +765,7 @@ class Module:
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, projections onto constraints included, and a lane that is through goes on with the next motion.
         Mechanisms with events or rigid contacts, inputs that vary over time, other methods and options, and the NumPy backend run
-        one by one through `simulate`; `note` of the solution says so.
+        one by one through `simulate`; `note` of the solution documents it.
 
         A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions

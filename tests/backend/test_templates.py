@@ -114,7 +114,7 @@ def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Pa
     mine, usual = (emit(derived("pendulum"), "c", templates=t).files for t in (tmp_path, None))
     assert mine["main.c"] == "// pendulum has 1 coordinates\nint main(void) { return 0; }\n"
     assert {n: t for n, t in mine.items() if n != "main.c"} == {n: t for n, t in usual.items() if n != "main.c"}
-    assert backends(tmp_path) == ["c", "fortran", "javascript", "julia", "matlab", "numpy", "python", "rust"]
+    assert backends(tmp_path) == ["c", "firmware", "fortran", "javascript", "julia", "matlab", "numpy", "python", "rust"]
 
 
 def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def failure(equations: Any, backend: str, templates: Any) -> str:
 def test_missing_folder_dialect_or_backend(derived: Callable[..., Any], folder: Path) -> None:
     equations = derived("pendulum")
     assert "/no/such/folder does not exist" in failure(equations, "c", "/no/such/folder")
-    known = "fortran, javascript, julia, matlab, numpy, python, rust"
+    known = "firmware, fortran, javascript, julia, matlab, numpy, python, rust"
     assert f"no backend 'ada'; there are c, ecmascript, {known}; a folder with a dialect" in failure(equations, "ada", folder)
     (folder / "ecmascript" / "dialect.toml").unlink()
     assert f"no backend 'ecmascript'; there are c, {known}" in failure(equations, "ecmascript", folder)
