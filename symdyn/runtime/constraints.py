@@ -42,8 +42,8 @@ def position_residual(module: Module, t: Any, x: Any, params: Any) -> np.ndarray
     return _violation(module, t, x, params)[0] / length(module, params)
 
 
-def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: float = 0.0) -> np.ndarray:
-    """C_dot C_scale / (the largest speed of all states, at least `at_least`, m/s), (..., n_c).
+def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: float = 0.0, each: bool = False) -> np.ndarray:
+    """C_dot C_scale / (the largest speed of all states, or of each alone, at least `at_least`, m/s), (..., n_c).
 
     A speed is |u_j|, times the mechanism's length if it is in rad/s, or that with which the constraints move by themselves.
     """
@@ -51,9 +51,10 @@ def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: flo
     still = np.array(x, dtype=float)
     u = np.array(still[..., n_q:n_q + n_u])
     still[..., n_q:n_q + n_u] = 0.0
-    moving = np.abs(_violation(module, t, still, params)[1]).max(initial=0.0)
-    speed = max(np.abs(u * as_velocities(module, params)).max(initial=0.0), moving, at_least)
-    return _violation(module, t, x, params)[1] / max(speed, np.finfo(float).tiny)
+    axis = -1 if each else None
+    moving = np.abs(_violation(module, t, still, params)[1]).max(axis=axis, initial=at_least, keepdims=True)
+    speed = np.maximum(moving, np.abs(u * as_velocities(module, params)).max(axis=axis, initial=0.0, keepdims=True))
+    return _violation(module, t, x, params)[1] / np.maximum(speed, np.finfo(float).tiny)
 
 
 def _violation(module: Module, t: Any, x: Any, params: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -185,47 +185,36 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
-    seconds = clock.perf_counter() - begun
     wrong |= astray
-    late = reports["status"] == STATUS.STEP_LIMIT
+    success, counts, late = reports["status"] == STATUS.DONE, _counts(reports), reports["status"] == STATUS.STEP_LIMIT
+    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
+    note = "" if width(module) > 1 else NO_VECTORS
+    if late.any() and not interrupted:
+        why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
+               "their steps may have become too short")
+        note = f"{late.sum()} of {n} motions one by one: they took more than {PATIENCE * PIECE} steps, and {why}"
     if projects(module):  # what keeps a state from the constraints, a run of its own finds out
-        late |= reports["status"] != STATUS.DONE
+        late |= ~success
         late[list(wrong)] = False
     if late.any() and not interrupted:
-        return _with_late(module, asked, x, reports, states, np.flatnonzero(late), wrong, begun)
-    success = reports["status"] == STATUS.DONE
-    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
-    counts = _counts(reports)
-    solution = BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], width(module),
-                             "" if width(module) > 1 else NO_VECTORS, seconds)
+        again = np.flatnonzero(late)
+        single = _alone(module, asked, again)
+        x[again], success[again] = single.x, single.success
+        counts[again] = np.column_stack([single.n_steps, single.n_rejected])
+        messages = {k: message for k, message in messages.items() if not late[k]}
+        messages |= {int(again[k]): message for k, message in single.messages.items()}
+    solution = BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
+                             width(module), note, clock.perf_counter() - begun)
     if interrupted:
         raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
     return solution
 
 
-def _with_late(module: Module, asked: _Asked, x: np.ndarray, reports: np.ndarray, states: np.ndarray, late: np.ndarray,
-               wrong: Mapping[int, str], begun: float) -> BatchSolution:
-    """Motions some of which are done again one by one: those that take so many steps that they may chatter, which a run of its
-    own finds out, and those that left their constraints."""
-    part = replace(asked, n=len(late), **{name: rows[late] if len(rows := getattr(asked, name)) > 1 else rows
-                                          for name in ("starts", "params", "inputs")})
-    single = _one_by_one(module, part, None, part.inputs, "", {"events": False})
-    success = reports["status"] == STATUS.DONE
-    unit: Any = module.unit(UNIT)
-    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)
-                if k not in late}
-    messages |= {int(late[k]): message for k, message in single.messages.items()}
-    counts = _counts(reports)
-    x[late], success[late] = single.x, single.success
-    counts[late] = np.column_stack([single.n_steps, single.n_rejected])
-    n_long = int((reports["status"] == STATUS.STEP_LIMIT).sum())
-    note = "" if width(module) > 1 else NO_VECTORS
-    if n_long:
-        jumps = bool(module.metadata.switches)
-        why = "the right-hand side jumps, so that they may chatter" if jumps else "their steps may have become too short"
-        note = f"{n_long} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and {why}"
-    return BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
-                         width(module), note, clock.perf_counter() - begun)
+def _alone(module: Module, asked: _Asked, which: np.ndarray) -> BatchSolution:
+    """Some motions one by one: a run of its own finds out whether a motion chatters and what led it off its constraints."""
+    part = replace(asked, n=len(which), **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
+                                           for name in ("starts", "params", "inputs")})
+    return _one_by_one(module, part, None, part.inputs, "", {"events": False})
 
 
 def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from symdyn.errors import SymdynError
 from symdyn.runtime.consistent import CONSISTENT, check_start, normalised
-from symdyn.runtime.constraints import length, names, turning
+from symdyn.runtime.constraints import length, names, position_residual, velocity_residual
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -57,14 +57,8 @@ def consistent_starts(module: Module, t: float, starts: np.ndarray, params: np.n
 
 def _inconsistent(module: Module, t: float, x: np.ndarray, params: np.ndarray, own: float) -> np.ndarray:
     """Which states (n, n_x) do not fulfil the constraints, as check_start judges one; own: the mechanism's length, m."""
-    n_q, n_u, n_c = module.metadata.sizes.q, module.metadata.sizes.u, len(names(module))
-    still = x.copy()
-    still[:, n_q:n_q + n_u] = 0.0
-    rows, moving = (module.evaluate("violation", t, states, params) for states in (x, still))
-    speeds = np.abs(x[:, n_q:n_q + n_u] * np.where(turning(module), own, 1.0)).max(axis=1, initial=1e-9 * own)
-    speeds = np.maximum(speeds, np.abs(moving[:, n_c:]).max(axis=1))
-    residuals = np.hstack([rows[:, :n_c] / own, rows[:, n_c:] / np.maximum(speeds, np.finfo(float).tiny)[:, None]])
-    return ~(np.abs(residuals) <= CONSISTENT).all(axis=1)
+    residuals = (position_residual(module, t, x, params), velocity_residual(module, t, x, params, 1e-9 * own, each=True))
+    return (np.abs(np.hstack(residuals)) > CONSISTENT).any(axis=1)
 
 
 def _why(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> str:
