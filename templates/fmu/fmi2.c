@@ -165,15 +165,7 @@ FMI2(fmi2DeSerializeFMUstate)(fmi2Component component, const fmi2Byte bytes[], s
 
 FMI2(fmi2GetDirectionalDerivative)(fmi2Component component, const fmi2ValueReference unknowns[], size_t n_unknowns,
     const fmi2ValueReference knowns[], size_t n_knowns, const fmi2Real seed[], fmi2Real sensitivity[]) {
-    for (size_t i = 0; i < n_unknowns; i++) {
-        sensitivity[i] = 0.0;
-        for (size_t j = 0; j < n_knowns; j++) {
-            double partial;
-            if (fmu_partial(component, unknowns[i], knowns[j], &partial)) return fmi2Error;
-            sensitivity[i] += partial * seed[j];
-        }
-    }
-    return fmi2OK;
+    return status_of(fmu_derivatives(component, unknowns, n_unknowns, knowns, n_knowns, seed, 0, sensitivity));
 }
 
 FMI2(fmi2EnterEventMode)(fmi2Component component) {

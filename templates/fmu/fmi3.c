@@ -228,30 +228,14 @@ FMI3(fmi3GetDirectionalDerivative)(fmi3Instance instance, const fmi3ValueReferen
     const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[],
     size_t n_sensitivity) {
     if (n_seed != n_knowns || n_sensitivity != n_unknowns) return unsupported(instance, "derivatives of arrays");
-    for (size_t i = 0; i < n_unknowns; i++) {
-        sensitivity[i] = 0.0;
-        for (size_t j = 0; j < n_knowns; j++) {
-            double partial;
-            if (fmu_partial(instance, unknowns[i], knowns[j], &partial)) return fmi3Error;
-            sensitivity[i] += partial * seed[j];
-        }
-    }
-    return fmi3OK;
+    return status_of(fmu_derivatives(instance, unknowns, n_unknowns, knowns, n_knowns, seed, 0, sensitivity));
 }
 
 FMI3(fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t n_unknowns,
     const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[],
     size_t n_sensitivity) {
     if (n_seed != n_unknowns || n_sensitivity != n_knowns) return unsupported(instance, "derivatives of arrays");
-    for (size_t j = 0; j < n_knowns; j++) {
-        sensitivity[j] = 0.0;
-        for (size_t i = 0; i < n_unknowns; i++) {
-            double partial;
-            if (fmu_partial(instance, unknowns[i], knowns[j], &partial)) return fmi3Error;
-            sensitivity[j] += partial * seed[i];
-        }
-    }
-    return fmi3OK;
+    return status_of(fmu_derivatives(instance, unknowns, n_unknowns, knowns, n_knowns, seed, 1, sensitivity));
 }
 
 FMI3(fmi3EnterConfigurationMode)(fmi3Instance instance) { return unsupported(instance, "configuration mode"); }

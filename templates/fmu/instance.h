@@ -437,6 +437,20 @@ static int fmu_partial(fmu_instance *f, unsigned int unknown, unsigned int known
 #endif
 }
 
+// The derivatives of unknowns by knowns times a seed: of each unknown along the seed of the knowns or, backward, by each known of
+// the unknowns weighted with the seed. Returns FMU_GOOD or FMU_FAILED.
+static int fmu_derivatives(fmu_instance *f, const unsigned int unknowns[], size_t n_unknowns, const unsigned int knowns[],
+    size_t n_knowns, const double seed[], int backward, double result[]) {
+    for (size_t k = 0; k < (backward ? n_knowns : n_unknowns); k++) result[k] = 0.0;
+    for (size_t i = 0; i < n_unknowns; i++)
+        for (size_t j = 0; j < n_knowns; j++) {
+            double partial;
+            if (fmu_partial(f, unknowns[i], knowns[j], &partial)) return FMU_FAILED;
+            result[backward ? j : i] += partial * seed[backward ? i : j];
+        }
+    return FMU_GOOD;
+}
+
 // The start of the simulation at t: the state comes onto the constraints.
 static int fmu_begin(fmu_instance *f, int has_tolerance, double tolerance, double t, int has_end, double t_end) {
     f->s.t = t;
