@@ -219,7 +219,7 @@ class _Parser:
         self._need("]")
         if len(found) not in (2, 3):
             raise Wrong(f"is {shown(self.text, 80)}; a point has {len(found)} components; write 2 or 3")
-        return tuple(sp.sympify(e) for e in [*found, sp.S.Zero][:3])
+        return tuple(sp.sympify(e, strict=True) for e in [*found, sp.S.Zero][:3])
 
     def _indices(self, word: str) -> tuple[int, ...]:
         self._need("[")

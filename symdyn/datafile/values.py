@@ -95,7 +95,7 @@ class Values:
             except Wrong as wrong:
                 self.fault(place, str(wrong))
         else:
-            return sp.sympify(given)
+            return sp.sympify(given, strict=True)
         return sp.S.Zero
 
     def expressions(self, given: Any, place: Place) -> list[sp.Expr]:

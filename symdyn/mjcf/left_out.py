@@ -70,8 +70,7 @@ def examine(c: Compiled, out: LeftOut) -> None:
                         "sd.AddedMass")
     if m.nflex:
         c.faults.append(f"{c.path}: the model has {m.nflex} deformable bodies (flex), which are not built; leave them out of "
-                        "the file, "
-                        "and describe beams with system.add_flexible_body")
+                        "the file, and describe beams with system.add_flexible_body")
     if m.nplugin:
         c.faults.append(f"{c.path}: the model has plugins, whose forces are not known; leave them out of the file")
     touching = [g for g in range(m.ngeom) if m.geom_contype[g] or m.geom_conaffinity[g]]

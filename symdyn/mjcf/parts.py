@@ -27,7 +27,7 @@ class Numbers:
             self.values |= {p: sp.S.One for p in model.parameters if p not in model.defaults}
 
     def value(self, e: Any) -> float:
-        return float(sp.sympify(e).xreplace(self.values))
+        return float(sp.sympify(e, strict=True).xreplace(self.values))
 
     def array(self, matrix: Any) -> np.ndarray:
         return np.array([[self.value(e) for e in row] for row in sp.Matrix(matrix).tolist()])

@@ -159,8 +159,8 @@ class Parser:
         if not model.frames.add(name, FrameOf(what, self._named(relative, scope) or scope + MODEL, pose, "", line)):
             return
         if f.true(element, "kinematic"):
-            f.at(element.line, f"{what} is kinematic: it moves as it is told; leave <kinematic> out, or hold its joint with "
-                               "fixed=...")
+            f.at(element.line, f"{what} is kinematic: its motion is given from outside; leave <kinematic> out, or hold its joint "
+                               "with fixed=...")
         inertial = element.find("inertial")
         mass, center, entries = 1.0, Pose(), [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]
         if inertial is not None:

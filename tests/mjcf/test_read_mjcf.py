@@ -1,4 +1,4 @@
-"""sd.read_mjcf: against MuJoCo's own masses and accelerations, and what faulty models are told."""
+"""sd.read_mjcf: against MuJoCo's own masses and accelerations, and the messages about faulty models."""
 
 from __future__ import annotations
 

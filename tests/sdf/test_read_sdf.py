@@ -1,4 +1,4 @@
-"""sd.read_sdf: against the same mechanisms from URDF and by hand, and what faulty files are told."""
+"""sd.read_sdf: against the same mechanisms from URDF and by hand, and the messages about faulty files."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_mimic_spring_weight_static(tmp_path: Path) -> None:
     assert system.check().loads[0].label == "weight of b" and system.check().loads[1].values[0] == -3 * (q - 0.1)
 
 
-# -- what is told
+# -- messages
 
 BASE = link("a")
 
