@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -79,22 +80,28 @@ def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path) -> None:
     assert dict(zip(REVEALED, revealed, strict=True)) == REVEALED
 
 
+@pytest.fixture
+def jedi(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Jedi with a cache of its own: processes that share one read files that another has half written."""
+    package: ModuleType = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
+    monkeypatch.setattr(package.settings, "cache_directory", str(tmp_path))
+    return package
+
+
 @pytest.mark.parametrize(("after", "names"), [
     ("sd.", {"System", "Revolute", "coordinates", "motions", "Table", "compare"}),
     ("system.", {"add_body", "add_joint", "add_force", "embedding", "augmented", "defaults"}),
     ("equations.", {"M_tilde", "compile", "verify", "write", "latex"}),
     ("module.", {"simulate", "rhs", "linearize", "equilibrium", "stability"}),
     ("solution.", {"t", "x", "plot", "energy", "reactions"})])
-def test_an_editor_completes_names(after: str, names: set[str]) -> None:
-    jedi = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
+def test_an_editor_completes_names(jedi: ModuleType, after: str, names: set[str]) -> None:
     text = USER + after
     lines = text.split("\n")
     offered = {c.name for c in jedi.Script(text).complete(len(lines), len(lines[-1]))}
     assert names <= offered, names - offered
 
 
-def test_an_editor_shows_signatures_with_defaults() -> None:
-    jedi = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
+def test_an_editor_shows_signatures_with_defaults(jedi: ModuleType) -> None:
     text = USER + "module.simulate("
     lines = text.split("\n")
     [signature] = jedi.Script(text).get_signatures(len(lines), len(lines[-1]))
