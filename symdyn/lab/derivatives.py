@@ -3,6 +3,7 @@
     python -m symdyn.lab.derivatives --count 1000 --seed 0      as many random mechanisms of all kinds
     python -m symdyn.lab.derivatives --catalogue                all mechanisms of the catalogue
     python -m symdyn.lab.derivatives --only 17                  one of them
+    python -m symdyn.lab.derivatives --keep FILE --seconds 600  for ten minutes; the same line again goes on with the others
 
 Of x_dot, multipliers and inverse dynamics, the derivatives by x, inputs, parameters, time and accelerations are taken along a
 random direction in each group, by module.jacobian, and compared with the central difference of the function's own tape.
@@ -21,18 +22,21 @@ each state.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time as clock
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 
+from symdyn.bench.work.resume import code
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions.tapes import function_tape, has_function
@@ -271,6 +275,36 @@ def results(numbers: Sequence[int], seed: int, jobs: int) -> Iterator[Result]:
         yield from pool.map(one, numbers)
 
 
+def kept(path: Path, seed: int) -> dict[int, Result]:
+    """Number -> result of what a file holds of these random mechanisms, measured with the code as it is now."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    # A run that was killed may have left part of a line.
+    whole = [json.loads(line) for line in lines if line.endswith("}}")]
+    return {one["number"]: Result(**one["result"]) for one in whole if (one["seed"], one["code"]) == (seed, code())}
+
+
+def going_on(numbers: Sequence[int], seed: int, jobs: int, path: Path) -> Iterator[Result]:
+    """Of random mechanisms: those in the file first, then the others, each written into it."""
+    known = kept(path, seed)
+    yield from (known[n] for n in numbers if n in known)
+    left = [n for n in numbers if n not in known]
+    with path.open("a", encoding="utf-8") as file:
+        file.write("\n" if file.tell() else "")  # after what a run that was killed wrote of a line
+        for number, result in zip(left, results(left, seed, jobs), strict=True):
+            file.write(json.dumps({"seed": seed, "code": code(), "number": number, "result": asdict(result)}) + "\n")
+            file.flush()
+            yield result
+
+
+def within(running: Iterable[Result], seconds: float) -> Iterator[Result]:
+    """Results until so many seconds have passed."""
+    begun = clock.perf_counter()
+    for result in running:
+        yield result
+        if clock.perf_counter() - begun > seconds:
+            return
+
+
 def summary(found: Sequence[Result]) -> str:
     """Largest error of each derivative, and how many fail."""
     kinds = dict.fromkeys(kind for r in found for kind in r.errors)
@@ -292,13 +326,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--catalogue", action="store_true", help="the mechanisms of the catalogue instead")
     parser.add_argument("--names", nargs="+", metavar="NAME", help="some of the catalogue")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="write every result into a file, and go on with what it holds")
+    parser.add_argument("--seconds", type=float, default=np.inf, help="stop after so many (default: when all are done)")
     parser.add_argument("--quiet", action="store_true", help="print failures and the summary alone")
     options = parser.parse_args(arguments)
     of_catalogue = options.catalogue or options.names
+    if of_catalogue and options.keep:
+        parser.error("--keep is of random mechanisms; leave out --catalogue and --names")
+    numbers = options.only or range(options.count)
     running = (map(catalogue_result, options.names or names()) if of_catalogue else
-               results(options.only or range(options.count), options.seed, options.jobs))
+               going_on(numbers, options.seed, options.jobs, options.keep) if options.keep else
+               results(numbers, options.seed, options.jobs))
     found = []
-    for result in running:
+    for result in within(running, options.seconds):
         found.append(result)
         if not (options.quiet and result.passed):
             print(result, flush=True)

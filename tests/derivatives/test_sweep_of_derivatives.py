@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,3 +61,29 @@ def test_verdicts() -> None:
     failed = replace(one, errors={"rhs by x": np.nan})
     assert not failed.passed and "FAILED" in str(failed) and "2 mechanisms, 1 fail" in summary([one, failed])
     assert "ROWS DIFFER  KeyError" in str(replace(one, same_bits=False, fault="KeyError"))
+
+
+def test_a_run_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                            capsys: pytest.CaptureFixture[str]) -> None:
+    computed = []
+
+    def measured(number: int, seed: int) -> Result:
+        computed.append(number)
+        return Result(f"{number} of {seed}", {"rhs by x": number * 1e-17}, 1.0, True, 0.1)
+
+    monkeypatch.setattr(derivatives, "random_result", measured)
+    file = tmp_path / "kept.jsonl"
+    line = ["--count", "3", "--keep", str(file)]
+    assert main([*line, "--seconds", "0"]) == 0
+    assert computed == [0] and "1 mechanisms, 0 fail" in capsys.readouterr().out
+    with file.open("a", encoding="utf-8") as end:
+        end.write('{"seed": 0, "co')  # of a run that was killed while it wrote
+    main(line)
+    main([*line, "--quiet"])
+    assert computed == [0, 1, 2]
+    assert "rhs by x                   2.0e-17 at most, in 3\n3 mechanisms, 0 fail" in capsys.readouterr().out
+    main([*line, "--seed", "1", "--seconds", "0"])
+    assert computed == [0, 1, 2, 0]  # of other random numbers
+    with pytest.raises(SystemExit):
+        main(["--catalogue", "--keep", str(file)])
+    assert "leave out --catalogue" in capsys.readouterr().err
