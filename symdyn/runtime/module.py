@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.batches.solution import BatchSolution
     from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.integrating.gradient import Gradient
+    from symdyn.runtime.integrating.ode_solver import CompiledSolver
     from symdyn.runtime.labelled import Labelled
     from symdyn.runtime.losses import Loss
     from symdyn.runtime.solutions.solution import Solution
@@ -709,6 +710,30 @@ class Module:
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
                         stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
                         extend=extend, sensitivities=sensitivities, sensitivity_control=sensitivity_control, step=step)
+
+    def ode_solver(self, method: str = "dop853", params: Values | None = None, inputs: InputValues | None = None, *,
+                   events: bool = True, stabilization: str | tuple[str, float] | None = None, interpolation: str = "linear",
+                   extend: str = "error") -> type[CompiledSolver]:
+        """Make a class of the compiled integrator that `scipy.integrate.solve_ivp` takes as its method.
+
+        method   "dop853", "bs54", "radau", "radau5", "gauss" or "taylor", as for `simulate`
+        params, inputs, stabilization, interpolation, extend   as for `simulate`
+        events   False leaves out events of the system that reset states or end the motion; with True (default) they raise, as
+                 solve_ivp looks for no other events than those that it is given
+
+        The class has the right-hand side `rhs(t, y)`, (n_x,) or (n_x, k), and its exact Jacobian `jac(t, y)`, (n_x, n_x), which
+        SciPy's own methods take as well. `solve_ivp` raises where its fun is not this right-hand side; None stands for it. Times
+        are in s, y is [q; u; z]. Tolerances are 1e-8 unless given. Constraints are kept along the steps and within them.
+        Raises ArgumentError for other methods, without the C backend, for sampled controllers and rigid contacts.
+
+        >>> from scipy.integrate import solve_ivp
+        >>> solver = sd.systems.pendulum().compile().ode_solver(params={"l": 2.0})
+        >>> solve_ivp(solver.rhs, (0, 1), [0.1, 0.0], method=solver).y[:, -1].round(6)
+        array([-0.059931, -0.177191])
+        """
+        from symdyn.runtime.integrating.ode_solver import Setting, solver_of
+
+        return solver_of(Setting.of(self, method, params, inputs, events, stabilization, interpolation, extend))
 
     def gradient(self, loss: Loss, by: Names, t: Row | None = None, q: Values | None = None, u: Values | None = None,
                  params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None, rtol: float = 1e-8,
