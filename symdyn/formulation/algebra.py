@@ -62,7 +62,8 @@ class TapeAlgebra:
 
     def constants(self, values: Iterable[Any]) -> np.ndarray:
         """A vector of expressions on the tape."""
-        return vector(*[self.expression(e) for e in values])
+        entries = values.flat() if isinstance(values, sp.MatrixBase) else values
+        return vector(*[self.expression(e) for e in entries])
 
     def matrix(self, values: sp.MatrixBase) -> np.ndarray:
         """A matrix of expressions on the tape."""

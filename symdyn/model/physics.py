@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Rod
@@ -22,12 +23,12 @@ def inertia_faults(body: Body, planar: bool) -> tuple[list[str], list[str]]:
     if body.mass.is_number and body.mass < 0:
         faults.append(f"{where} has the mass {body.mass} kg; pass zero or a positive mass")
     I = body.inertia
-    difference = I - I.T
-    if any(e != 0 and abs(numeric(e)) > 1e-12 * max(abs(numeric(a)) for a in I) for e in difference):
+    difference = sp.zeros(3, 3) if I == I.T else I - I.T
+    if any(e != 0 and abs(numeric(e)) > 1e-12 * max(abs(numeric(a)) for a in I) for e in difference.flat()):
         i, j = next((i, j) for i in range(3) for j in range(3) if difference[i, j] != 0)
         faults.append(f"{where}: inertia is not symmetric: I[{i + 1}, {j + 1}] = {I[i, j]}, "
                            f"I[{j + 1}, {i + 1}] = {I[j, i]}; pass a symmetric matrix")
-    elif all(e.is_number for e in I) and any(e != 0 for e in I):
+    elif all(e.is_number for e in I.flat()) and any(e != 0 for e in I.flat()):
         values = np.linalg.eigvalsh(np.array(I.tolist(), dtype=float))
         scale = np.abs(values).max()
         if values[0] < -1e-12 * scale:

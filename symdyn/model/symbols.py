@@ -242,7 +242,7 @@ def motions(names: str, **assumptions: bool) -> Any:
 
 def symbols_of(expression: Any) -> set[Any]:
     """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
-    entries = list(expression) if isinstance(expression, sp.MatrixBase) else [expression]
+    entries = expression.flat() if isinstance(expression, sp.MatrixBase) else [expression]
     if all(isinstance(e, sp.Expr) for e in entries):
         parts = parts_of(*entries)
         if all(_free_of_its_own(kind) for kind in {type(part) for part in parts}):  # type: ignore[arg-type]

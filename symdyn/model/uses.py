@@ -48,7 +48,7 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
     s = system
     yield "gravity", s.gravity, Scope.PARAMETERS
     for body in s.bodies:
-        yield f"body {shown(body.name)}", [body.mass, *body.com, *body.inertia], Scope.PARAMETERS
+        yield f"body {shown(body.name)}", [body.mass, *body.com.flat(), *body.inertia.flat()], Scope.PARAMETERS
     for gear in (g for g in s.loops if isinstance(g, Gear)):
         yield f"gear {shown(gear.name)}", [gear.ratio, gear.offset], Scope.PARAMETERS
     for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:

@@ -11,6 +11,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.formulation.probes.rank import first_dependent
+from symdyn.model.joints import Joint
 from symdyn.model.record import Model, joint_speeds
 from symdyn.shown import shown
 from symdyn.tape.evaluate import evaluate
@@ -23,7 +24,7 @@ DIGITS = 40
 
 def demand_mass_matrix(model: Model, recorder: Recorder, M: np.ndarray) -> None:
     """Raise ModelError if M_tilde (n_u, n_u) has a zero on its diagonal or dependent rows at every state."""
-    faults = [massless(model, u) for k, u in enumerate(model.speeds) if is_zero(M[k, k])]
+    faults = _massless(model, [u for k, u in enumerate(model.speeds) if is_zero(M[k, k])])
     if faults:
         raise ModelError(faults, model.name)
     dependent = first_dependent(recorder, M)
@@ -36,7 +37,7 @@ def demand_pivots(model: Model, recorder: Recorder, pivots: Sequence[tuple[Any, 
 
     Tried at a random state, with so many digits that rounding cannot hide it.
     """
-    faults = [massless(model, u) for pivot, u in pivots if is_zero(pivot)]
+    faults = _massless(model, [u for pivot, u in pivots if is_zero(pivot)])
     if faults:
         raise ModelError(faults, model.name)
     nodes = [(pivot, u) for pivot, u in pivots if isinstance(pivot, Node)]
@@ -48,9 +49,18 @@ def demand_pivots(model: Model, recorder: Recorder, pivots: Sequence[tuple[Any, 
             raise ModelError([_dependent(u)], model.name)
 
 
-def massless(model: Model, u: sp.Symbol) -> str:
-    """That nothing with mass moves along a speed, and what to do."""
-    joint = next((j for j in model.joints if u in joint_speeds(j)), None)
+def _massless(model: Model, speeds: Sequence[sp.Symbol]) -> list[str]:
+    joints = joints_by_speed(model) if speeds else {}
+    return [massless(u, joints.get(u)) for u in speeds]
+
+
+def joints_by_speed(model: Model) -> dict[sp.Symbol, Joint]:
+    """The first joint that has each speed for its own."""
+    return {u: joint for joint in reversed(model.joints) for u in joint_speeds(joint) if u is not None}
+
+
+def massless(u: sp.Symbol, joint: Joint | None) -> str:
+    """That nothing with mass moves along a speed, which is that of a joint or of none, and what to do."""
     if joint is None:
         return f"no joint with mass or inertia moves with {u}; use its coordinate in the expression of a joint, or leave it out"
     return (f"joint {shown(joint.name)}: what it moves has no mass or inertia along {u}; give body "

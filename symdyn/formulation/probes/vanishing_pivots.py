@@ -64,16 +64,11 @@ def _filled(tree: Tree, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inertia = tree.links[k].inertia
     whole = np.array([inertia.m, *inertia.h, *inertia.I.ravel()], dtype=object)
     nodes = Tape.of(Recorder(), whole=whole)
-    if _idle(tree).isdisjoint(leaf.args[1] for leaf in nodes.inputs):
+    if tree.idle.isdisjoint(leaf.args[1] for leaf in nodes.inputs):
         filled = np.array([not is_zero(e) for e in whole])
     else:
         filled = abs(_Position(tree, 0, False).numbers(whole)[0]) > math.sqrt(NOTHING)
     return filled[:1], filled[1:4], filled[4:].reshape(3, 3)
-
-
-def _idle(tree: Tree) -> set[str]:
-    """Parameters of the default 0."""
-    return {p.name for p, value in tree.model.defaults.items() if value == 0}
 
 
 def behind(tree: Tree, k: int, twist: np.ndarray, blocks: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> Any:
@@ -110,9 +105,9 @@ class _Search:
         self.own: list[list[frozenset[int]]] = []  # of each link, of each of its joint's speeds
         for link in tree.links:
             before = self.moving[link.parent] if link.parent >= 0 else frozenset()
-            self.own.append([places(row) for row in tree.D[link.speeds]])
+            self.own.append([tree.drivers[k] for k in link.speeds])
             self.moving.append(before.union(*self.own[-1]))
-        bending = [places(tree.D[place]) for body in tree.flexible for place in body.speeds]
+        bending = [tree.drivers[k] for body in tree.flexible for k in body.speeds]
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
         self.positions = [_Position(tree, k, solid, self.own) for k in range(POSITIONS)]
 
@@ -160,7 +155,7 @@ class _Position:
     def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = ()) -> None:
         self.tree, self.solid, self.own = tree, solid, own
         self.stream = random.Random(seed)
-        self.values = dict.fromkeys(_idle(tree), 0.0)
+        self.values = dict.fromkeys(tree.idle, 0.0)
         for joint in tree.model.joints:
             if isinstance(getattr(joint, "orientation", None), EulerParameters):
                 p = [self.stream.uniform(0.5, 1.5) for _ in range(4)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from symdyn.errors import SymdynError
 from symdyn.formulation.trees.tree import Tree
-from symdyn.tape.node import is_zero
 
 
 def own_speeds(tree: Tree) -> list[list[int]]:
@@ -15,8 +14,9 @@ def own_speeds(tree: Tree) -> list[list[int]]:
     """
     own: list[list[int]] = [[] for _ in tree.links]
     faults = []
-    for j, u in enumerate(tree.model.speeds):
-        moved = [i for i, link in enumerate(tree.links) if any(not is_zero(tree.D[row, j]) for row in link.speeds)]
+    link_of = {row: i for i, link in enumerate(tree.links) for row in link.speeds}
+    for j, (u, rows) in enumerate(zip(tree.model.speeds, tree.driven, strict=True)):
+        moved = sorted({link_of[row] for row in rows})
         if len(moved) == 1:
             own[moved[0]].append(j)
         elif moved:

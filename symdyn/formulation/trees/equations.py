@@ -63,9 +63,10 @@ def _point_units(model: Model) -> dict[str, str]:
 def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], again: Callable[[], E], **more: Any) -> E:
     """The equations that hold the quantities of a tree; again: derives them again."""
     model, tree, algebra = quantities.model, quantities.tree, quantities.algebra
+    parameters = set(model.parameters)
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
                       model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model),
-                      {b.mass: b.name for b in reversed(model.bodies) if b.mass in model.parameters}, _point_units(model))
+                      {b.mass: b.name for b in reversed(model.bodies) if b.mass in parameters}, _point_units(model))
     recorded = quantities.quantities()
     lengths = [e for shape in model.shapes for e in shape.expressions]
     if lengths:

@@ -12,7 +12,7 @@ import sympy as sp
 from symdyn.errors import SymdynError
 from symdyn.formulation.accelerations import Solver
 from symdyn.formulation.printed.independent_speeds import MotionEquations
-from symdyn.formulation.probes.inertia_faults import demand_pivots, massless
+from symdyn.formulation.probes.inertia_faults import demand_pivots, joints_by_speed, massless
 from symdyn.formulation.textbook.page import Page
 from symdyn.formulation.trees.articulated import Articulated
 from symdyn.formulation.trees.equations import derive_tree
@@ -24,7 +24,6 @@ from symdyn.model.joints import Fixed
 from symdyn.model.record import Model
 from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
-from symdyn.tape.node import is_zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,8 +132,9 @@ class RecursiveTree(TreeQuantities):
         """What it means, speed by speed, if S^T I^A S is not positive."""
         if self.own is None:
             return super().reasons()
+        joints = joints_by_speed(self.model)
         return [f"the articulated inertia S^T I^A S is not positive along {u}{self.remarks[u]}" if k in self.lockable else
-                f"{massless(self.model, u)} (S^T I^A S is not positive){self.remarks.get(u, '')}"
+                f"{massless(u, joints.get(u))} (S^T I^A S is not positive){self.remarks.get(u, '')}"
                 for k, u in enumerate(self.speeds)]
 
     def articulated(self) -> Articulated:
@@ -175,9 +175,9 @@ class _InSpeeds:
 def _own_speeds(tree: Tree) -> tuple[int, ...] | None:
     """For each generalized speed the place of the joint speed that it is, or None if joints share speeds or scale them."""
     places = []
-    for column in range(tree.D.shape[1]):
-        used: list[tuple[int, Any]] = [(row, e) for row, e in enumerate(tree.D[:, column]) if not is_zero(e)]
-        if len(used) != 1 or not isinstance(used[0][1], int) or used[0][1] != 1:
+    for column, rows in enumerate(tree.driven):
+        factors = [tree.D[row, column] for row in rows]
+        if len(factors) != 1 or not isinstance(factors[0], int) or factors[0] != 1:
             return None
-        places.append(used[0][0])
+        places.append(rows[0])
     return tuple(places) if len(set(places)) == len(places) else None

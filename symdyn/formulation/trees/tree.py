@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.identification.joint_regrouping import coordinate_axis, unmoved
-from symdyn.formulation.probes.vanishing_pivots import lockable
+from symdyn.formulation.probes.vanishing_pivots import lockable, places
 from symdyn.formulation.trees.axes import along_coordinate_axis
 from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.water import of_load
@@ -106,6 +106,25 @@ class Tree:
     def plain(self) -> bool:
         """Whether the joint speeds are the generalized speeds themselves."""
         return self.D.shape[0] == self.D.shape[1] and bool(np.all(np.asarray(np.eye(len(self.w), dtype=int) == self.D)))
+
+    @cached_property
+    def drivers(self) -> tuple[frozenset[int], ...]:
+        """For each joint speed the places of the generalized speeds that it is made of: columns of D that are not zero."""
+        return tuple(places(row) for row in self.D)
+
+    @cached_property
+    def driven(self) -> tuple[tuple[int, ...], ...]:
+        """For each generalized speed the places of the joint speeds that it is part of: rows of D that are not zero."""
+        found: list[list[int]] = [[] for _ in self.model.speeds]
+        for k, speeds in enumerate(self.drivers):
+            for j in speeds:
+                found[j].append(k)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def idle(self) -> frozenset[str]:
+        """Names of the parameters of the default 0."""
+        return frozenset(p.name for p, value in self.model.defaults.items() if value == 0)
 
     @cached_property
     def locking(self) -> Mapping[int, frozenset[int]]:

@@ -19,7 +19,7 @@ from symdyn.spatial.vectors import Vector
 if TYPE_CHECKING:
     from symdyn.given import BodyOrName, Matrix, Scalar
 
-IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+IDENTITY = sp.ImmutableMatrix.eye(3)
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,9 @@ class Joint:
     @property
     def constants(self) -> list[sp.Expr]:
         """Expressions of parameters that describe the joint."""
-        return [*self.parent_point, *self.child_point, *self.parent_rotation, *self.child_rotation,
-                *getattr(self, "axis", []), *[e for axis in getattr(self, "axes", []) for e in axis]]
+        matrices = [self.parent_point, self.child_point, self.parent_rotation, self.child_rotation]
+        matrices += [self.axis] if hasattr(self, "axis") else []
+        return [e for matrix in [*matrices, *getattr(self, "axes", [])] for e in matrix.flat()]
 
     def rates(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> list[Any]:
         """Derivatives of the coordinates from the speeds, q_dot = N(q) u."""
@@ -145,8 +146,10 @@ class Joint:
         return tuple(given)
 
     def _rotation(self, value: Any, what: str) -> sp.ImmutableMatrix:
+        if value is None:
+            return IDENTITY
         before = len(self.faults)
-        matrix = self.faults.matrix(IDENTITY if value is None else value, f"joint {shown(self.name)}: {what}")
+        matrix = self.faults.matrix(value, f"joint {shown(self.name)}: {what}")
         residual = rotation_residual(matrix) if len(self.faults) == before else 0.0
         if residual > 1e-9:
             self.faults.append(f"joint {shown(self.name)}: {what} is not a rotation: R R^T differs from the identity "
