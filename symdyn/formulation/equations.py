@@ -347,7 +347,7 @@ class Equations:
               method: str = "dop853") -> list[Path]:
         """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
 
-        backend      "c" or "numpy"
+        backend      "c", "numpy", "fortran", "julia", "matlab", "rust", or one of your own templates
         functions    names of what is written; default: the usual ones that the formulation has
         templates    folder whose templates take precedence
         specialize   parameters, by symbol or name, that become numbers in the code and are folded

@@ -42,7 +42,8 @@ class External:
                  Jacobians, rates and linearization, and in turn its own derivative for derivatives of those
     precise      f(mp, *arguments) for an mpmath context and its numbers, which proofs and reference vectors are then made with;
                  without it these see the function in floating point
-    texts        backend -> text, for backends of one's own
+    texts        backend -> text: for "fortran", "julia", "matlab" and "rust" a function of numbers that returns the result, or
+                 an array of them; for backends of one's own what their templates take
     reason       what it means where the function fails or a result is not finite; there a simulation stops and reports it
     operations   about how many operations it takes: what counts of it in reports and choices
 

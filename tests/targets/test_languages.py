@@ -56,6 +56,63 @@ def test_all_functions_give_their_reference_vectors(name: str, language: str, tm
     assert found.returncode == 0 and "all results agree" in found.stdout, found.stdout + found.stderr
 
 
+def ratio(x: float, y: float) -> tuple[float, float]:
+    return x / y, x * y
+
+
+def square(x: float) -> float:
+    return x * x
+
+
+# A function with two results, which is not finite at y = 0, and one with one result and a helper, in each language.
+TEXTS = {
+    "fortran": ("""pure function ratio(x, y) result(r)
+    real(dp), intent(in) :: x, y
+    real(dp) :: r(2)
+    r = [x/y, x*y]
+end function""", """pure function twice(x) result(r)
+    real(dp), intent(in) :: x
+    real(dp) :: r
+    r = 2.0_dp*x
+end function
+
+pure function square(x) result(r)
+    real(dp), intent(in) :: x
+    real(dp) :: r
+    r = twice(x)*x/2.0_dp
+end function"""),
+    "julia": ("ratio(x, y) = (x/y, x*y)", "twice(x) = 2.0*x\n\nsquare(x) = twice(x)*x/2.0"),
+    "matlab": ("function r = ratio(x, y)\nr = [x/y, x*y];\nend",
+               "function r = twice(x)\nr = 2*x;\nend\n\nfunction r = square(x)\nr = twice(x)*x/2;\nend"),
+    "rust": ("fn ratio(x: f64, y: f64) -> [f64; 2] {\n    [x / y, x * y]\n}",
+             "fn twice(x: f64) -> f64 {\n    2.0 * x\n}\n\nfn square(x: f64) -> f64 {\n    twice(x) * x / 2.0\n}")}
+
+
+def driven_by_functions(language: str) -> sd.System:
+    """A pendulum with torques from functions of the user, of its angle and its speed."""
+    system, q = sd.systems.pendulum(), sd.coordinates("q1")
+    first, second = sd.External("ratio", ["x", "y"], 2, python=ratio, texts={language: TEXTS[language][0]})(q, q.dot)
+    one = sd.External("square", ["x"], python=square, texts={language: TEXTS[language][1]})(q)
+    system.add_torque("bob", first + 2 * second + one)
+    return system
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_functions_of_the_user_in_a_language(language: str, tmp_path: Path) -> None:
+    source = emit(driven_by_functions(language).embedding(), language, ["rhs"])
+    write_source(source, tmp_path)
+    command = built(language, tmp_path, "pendulum")
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert found.returncode == 0 and "all results agree" in found.stdout, found.stdout + found.stderr
+    if language == "matlab":  # q1_dot is 0, where the ratio is not finite
+        command = [*command[:-1], "pendulum('rhs', 0, [1; 0])"]
+        found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        assert "the function ratio failed or gave what is not finite" in found.stderr
+        return
+    found = subprocess.run([*command, "rhs"], cwd=tmp_path, input="0 1 0\n", capture_output=True, text=True, timeout=60)
+    assert found.stdout.lower().split() == ["nan", "nan"]
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_wrong_result_is_found(language: str, tmp_path: Path) -> None:
     source = emit(sd.systems.pendulum().embedding(), language, ["rhs"])
@@ -95,7 +152,7 @@ def test_a_value_that_must_be_positive_and_is_not(language: str, tmp_path: Path)
 def test_julia_has_no_fault_of_syntax() -> None:
     tree_sitter, grammar = pytest.importorskip("tree_sitter"), pytest.importorskip("tree_sitter_julia")
     parser = tree_sitter.Parser(tree_sitter.Language(grammar.language()))
-    for equations in (strange().embedding(), sd.systems.get("bricard").augmented()):
+    for equations in (strange().embedding(), sd.systems.get("bricard").augmented(), driven_by_functions("julia").embedding()):
         for name, text in emit(equations, "julia").files.items():
             assert not parser.parse(text.encode()).root_node.has_error, name
     assert parser.parse(b"function f(x)\n x +* 2\nend\n").root_node.has_error
