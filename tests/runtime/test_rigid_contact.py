@@ -1,6 +1,7 @@
 """Motions with rigid contacts against closed forms."""
 
 import pickle
+import re
 import warnings
 from typing import Any
 
@@ -204,11 +205,35 @@ def test_impacts_lose_energy_by_poissons_law_and_have_one_solution() -> None:
             assert law == "newton" or (v + found[0].w) @ found[0].lam <= 1e-12
 
 
+def test_what_happens_at_many_instants_is_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ball(restitution=0.9).compile()
+    monkeypatch.setattr(contacts, "impact", lambda *given: 2 * impact(*given))
+    with pytest.warns(SimulationWarning) as found:
+        solution = module.simulate((0, 3), q=[0.5])
+    [message] = [str(w.message) for w in found]
+    n = len(solution.contacts["floor"].impacts.t)
+    assert n > 2
+    assert re.search(rf"t = 0\.319275428 s has 2 solutions; .* was taken\. The like happened at {n - 1} more instants, the "
+                     r"latest t = 2\.\d+ s, at contacts floor$", message), message
+
+
+def test_energy_of_the_size_of_rounding_is_not_reported(monkeypatch: pytest.MonkeyPatch,
+                                                        recwarn: pytest.WarningsRecorder) -> None:
+    """An impact on paper, with which the ball leaves at 10 m/s, of an impulse that is next to nothing, and of one that counts."""
+    module = ball(restitution=0.9).compile()
+    for impulse, reported in ((1e-18, 0), (1e-3, 1)):
+        one = Solved((Mode(SLIDING, np.zeros(0), True),), np.array([impulse]), np.array([10.0]), False)
+        monkeypatch.setattr(contacts, "impact", lambda *given, one=one: [one])
+        recwarn.clear()
+        module.simulate((0, 0.3193), q=[0.5])
+        assert len([w for w in recwarn if "adds" in str(w.message)]) == reported
+
+
 def test_modes_that_do_not_settle_and_impacts_without_solution_stop_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ball(restitution=0.9).compile()
     with monkeypatch.context() as patched:
         patched.setattr(contacts, "SAME_TIME", 10.0)
-        with pytest.warns(SimulationWarning, match="modes of contacts do not settle: 50 switches within .* of floor"):
+        with pytest.warns(SimulationWarning, match="modes of contacts do not settle: 50 switches within .* of floor.*'moreau'"):
             module.simulate((0, 6), q=[0.5])
     several = [Solved((Mode(SLIDING, np.zeros(0), True),), np.array([k]), np.array([0.0]), False) for k in (5.0, 4.0)]
     for found, message in (([], "impact of floor has no solution under Coulomb's law and impact='newton'"),

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.metadata import ContactRecord
-from symdyn.contact_kinds import BODIES, CLUTCH
+from symdyn.contact_kinds import BODIES, CLUTCH, FRICTION
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
@@ -213,6 +213,23 @@ class _Stop(Exception):
 
 
 @dataclass
+class _Doubt:
+    """What to warn of, once for all instants of its kind: the text of the most important one, and how often it was so again."""
+
+    text: str
+    weight: float
+    more: int = 0
+    until: float = 0.0
+    names: dict[str, None] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        if not self.more:
+            return self.text
+        return (f"{self.text}. The like happened at {self.more} more instant{'s' * (self.more > 1)}, the latest t = "
+                f"{self.until:.9g} s, at contacts {', '.join(self.names)}")
+
+
+@dataclass
 class _Phases:
     module: Module
     request: Request
@@ -223,7 +240,7 @@ class _Phases:
     phases: list[Phase] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
     happened: list[Happened] = field(default_factory=list)
-    doubts: list[str] = field(default_factory=list)
+    doubts: dict[str, _Doubt] = field(default_factory=dict)  # by kind
     keeps: bool = False  # whether switches are kept for a way back
     crossed: list[Switch] = field(default_factory=list)
     made: list[Made] = field(default_factory=list)  # at the latest switch
@@ -255,6 +272,7 @@ class _Phases:
         self.size = 0.0  # of coordinates and gaps
         self.latest_numbers: tuple[tuple[float, bytes, bytes], Numbers] | None = None  # and what they are of
         self.fresh = [False] * n  # whether it has just begun to slip
+        self.most_kinetic: float | None = None  # energy, once it was looked at
         self.shared = False
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
@@ -330,8 +348,11 @@ class _Phases:
         self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}
         self._wait(t)
         if self.at_once >= MOST_SWITCHES:
+            counted = all(record.kind not in (CLUTCH, FRICTION) and record.impact == "newton" and IGNORED not in record.events
+                          for record in self.records)
             raise _Stop(f"the modes of contacts do not settle: {self.at_once} switches within {self.same:.3g} s, the latest of "
-                        f"{self.latest}; a compliant contact where they touch, or other coefficients, leave one mode")
+                        f"{self.latest}; a compliant contact where they touch, or other coefficients, leave one mode"
+                        + "; method='moreau' with a step goes across them without locating switches" * counted)
 
     def _phase(self, t: float, x: np.ndarray) -> Outcome:
         """From one switch to the next."""
@@ -458,7 +479,7 @@ class _Phases:
         """The state that a switch makes of another one, and what the contacts that are hit do there."""
         other = copy.copy(self)
         other.request = replace(self.request, p=p, inputs=inputs)
-        other.impacts, other.happened, other.doubts, other.latest_numbers = [], [], [], None
+        other.impacts, other.happened, other.doubts, other.latest_numbers = [], [], {}, None
         x, decided = x.copy(), []
         for one in made:
             other.modes, other.still = list(one.modes), list(one.still)
@@ -586,17 +607,17 @@ class _Phases:
             raise _Stop(f"the impact of {names} has no solution under Coulomb's law and impact='{law}'; take the other law of "
                         "impacts, or less friction")
         if len(found) > 1:
-            self.doubts.append(f"{self.module.name}: the impact of {names} at t = {t:.9g} s has {len(found)} solutions; the one "
-                               f"in which contacts are {self._named(touching, found[0])} was taken")
+            self._doubt("impact", t, touching, f"the impact of {names} at t = {t:.9g} s has {len(found)} solutions; the one in "
+                        f"which contacts are {self._named(touching, found[0])} was taken")
         one = found[0]
         n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
         after = x.copy()
         after[n_q:n_q + n_u] += at.speeds[:, places] @ one.lam
         gained = float((v + one.w) @ one.lam) / 2
         size = float(np.abs(v) @ np.abs(one.lam))
-        if gained > 1e-9 * size:
-            self.doubts.append(f"{self.module.name}: the impact of {names} at t = {t:.9g} s adds {gained:.3g} J, as Newton's law "
-                               "may with friction or several contacts; pass impact='poisson'")
+        if gained > 1e-9 * size and gained > 1e-12 * self._kinetic_energy(t, x):
+            self._doubt("energy", t, touching, f"the impact of {names} at t = {t:.9g} s adds {gained:.3g} J, as Newton's law may "
+                        "with friction or several contacts; pass impact='poisson'", gained)
         impulses = np.zeros(len(at.slip))
         impulses[places] = one.lam
         self.impacts.append(Impact(t, impulses, at.slip, self._numbers(t, after).slip))
@@ -621,6 +642,16 @@ class _Phases:
             if k not in rebound and self.modes[k] == OPEN:
                 self.modes[k] = SLIDING
         return self._onto_surfaces(t, after), rebound
+
+    def _kinetic_energy(self, t: float, x: np.ndarray) -> float:
+        """The largest of the motion so far, J, which the speeds of impacts at rest are rounding of; 0 where it is not defined."""
+        if "energy" in self.module.functions:
+            request, n = self.request, self.request.n_state
+            times = np.concatenate([*(self.ts if self.most_kinetic is None else []), [t]])
+            states = np.vstack([*(self.xs if self.most_kinetic is None else []), x])[:, :n]
+            energies = self.module.evaluate("energy", times, states, request.p, request.inputs.rows(times, states))
+            self.most_kinetic = max(self.most_kinetic or 0.0, float(energies.reshape(len(times), -1)[:, 0].max()))
+        return self.most_kinetic or 0.0
 
     def _sites(self, at: Numbers, chosen: Sequence[int], impact: bool = False) -> list[Site]:
         """The contacts of a problem, with their rows among themselves."""
@@ -652,13 +683,14 @@ class _Phases:
                         "friction pushes the bodies into each other faster than any force separates them); less friction, or "
                         "elasticity where they touch, leaves a solution")
         if len(found) > 1:
-            self.doubts.append(f"{self.module.name}: at t = {t:.9g} s the laws of contact and friction allow {len(found)} "
-                               f"motions (Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
-        border = [self.records[closed[k]].name for k in degenerate(D, b, self._sites(at, closed), found[0])] if found else []
+            self._doubt("motions", t, closed, f"at t = {t:.9g} s the laws of contact and friction allow {len(found)} motions "
+                        f"(Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
+        border = [closed[k] for k in degenerate(D, b, self._sites(at, closed), found[0])] if found else []
         if border:
-            self.doubts.append(f"{self.module.name}: at t = {t:.9g} s contacts {', '.join(border)} are on the border of two "
-                               f"modes with the same accelerations; {self._named(closed, found[0])} was taken, and a small "
-                               "change of the state may lead to another motion")
+            named = ", ".join(self.records[k].name for k in border)
+            self._doubt("border", t, border, f"at t = {t:.9g} s contacts {named} are on the border of two modes with the same "
+                        f"accelerations; {self._named(closed, found[0])} was taken, and a small change of the state may lead "
+                        "to another motion")
         self.modes = [OPEN] * len(self.records)
         self.fresh = [False] * len(self.records)
         self.shared = bool(found) and found[0].shared
@@ -670,6 +702,18 @@ class _Phases:
             if self.fresh[k]:  # its slip is zero, and so are what these events look at
                 self.unlooked |= {self.events[k][what] for what in ("sticks", "turns") if what in self.events[k]}
                 self._wait(t, SLIP_GRACE)
+
+    def _doubt(self, kind: str, t: float, of: Sequence[int], text: str, weight: float = 0.0) -> None:
+        """Note what to warn of, with its contacts."""
+        text = f"{self.module.name}: {text}"
+        doubt = self.doubts.get(kind)
+        if doubt is None:
+            self.doubts[kind] = doubt = _Doubt(text, weight)
+        else:
+            doubt.more, doubt.until = doubt.more + 1, t
+            if weight > doubt.weight:
+                doubt.text, doubt.weight = text, weight
+        doubt.names |= dict.fromkeys(self.records[k].name for k in of)
 
     def _wait(self, t: float, part: float = GRACE) -> None:
         """Look for events that are not looked for again after a part of the run."""
@@ -724,9 +768,10 @@ class _Phases:
         happened = sorted(self.happened, key=lambda one: one.t)
         if not self.done:
             return Outcome(times, states.reshape(-1, width), False, message, interrupted, 0, 0, 0, cause=cause,
-                           happened=happened, doubts=tuple(self.doubts), **notes)
+                           happened=happened, doubts=tuple(map(str, self.doubts.values())), **notes)
         if message and not over and (not len(times) or t > times[-1]):
             times, states = np.append(times, t), np.vstack([states, x])
             phase_of = np.append(phase_of, len(self.ts) - 1)
         whole = of_pieces(self.done, times, states, self.n_steps, message, cause, interrupted, over)
-        return replace(whole, happened=happened, doubts=(*self.doubts, *whole.doubts), row_phases=phase_of, **notes)
+        doubts = (*map(str, self.doubts.values()), *whole.doubts)
+        return replace(whole, happened=happened, doubts=doubts, row_phases=phase_of, **notes)
