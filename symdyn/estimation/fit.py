@@ -62,6 +62,8 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
     1.3
     """
     experiments = taken(module, data)
+    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
+        raise ArgumentError(f"{module.name}: max_steps is {shown(max_steps)}; pass a whole number from 1 on")
     problem = _problem(module, experiments, parameters, initial, bounds, priors, noise, start, rtol, method)
     guess = np.array([unknown.guess for unknown in problem.unknowns])
     first = problem.residuals(guess)
@@ -147,6 +149,11 @@ class _Problem:
             self._at = None
             try:
                 motions = [self._run(k, values) for k in range(len(self.experiments))]
+            except ArgumentError:
+                if self.runs == 1:  # what was asked is at fault, not where the iteration has gone
+                    raise
+                self.failure = "its arguments are out of range"
+                return False
             except SymdynError as error:
                 self.failure = str(error)
                 return False
@@ -190,7 +197,7 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
     named = _names(parameters, metadata.parameters, "parameters", "parameter", faults)
     states = _names(initial, metadata.x, "initial", "state", faults)
     defaults = dict(zip(metadata.parameters, metadata.defaults, strict=True))
-    guesses = {str(name_of(key)): value for key, value in (start or {}).items()}
+    guesses = {str(name_of(key)): value for key, value in _by_name(start, "start", "l: 1.0", faults).items()}
     faults += [f"start has {shown(key)}, which is not fitted" for key in guesses if key not in named]
     unknowns = []
     for name in named:
@@ -245,18 +252,28 @@ def _names(given: Any, there: Sequence[str], what: str, kind: str, faults: list[
     return found
 
 
+def _by_name(given: Any, what: str, example: str, faults: list[str]) -> Mapping[Any, Any]:
+    """A dictionary as it is, an empty one for None; anything else is a fault."""
+    if given is None or isinstance(given, Mapping):
+        return given or {}
+    faults.append(f"{what} is {shown(given)}; pass a dictionary from names to values, such as {{{example}}}")
+    return {}
+
+
 def _pairs(given: Any, what: str, named: Sequence[str], states: Sequence[str],
            faults: list[str]) -> dict[str, tuple[float, float]]:
     """Name -> two numbers; of initial values as "q1(0)"."""
     there = [*named, *[f"{state}(0)" for state in states]]
     result = {}
-    for key, pair in (given or {}).items():
+    for key, pair in _by_name(given, what, "l: (0.5, 2.0)", faults).items():
         name = str(name_of(key))
         if name not in there:
             faults.append(f"{what} has {shown(key)}, which is not fitted; fitted are {', '.join(there)}")
         elif not isinstance(pair, (list, tuple)) or len(pair) != 2 or any(
                 isinstance(v, bool) or not isinstance(v, (int, float, np.number)) or np.isnan(v) for v in pair):
             faults.append(f"{what} of {name} is {shown(pair)}; pass a pair of numbers")
+        elif what == "priors" and not np.isfinite([float(v) for v in pair]).all():
+            faults.append(f"{what} of {name} is {shown(pair)}; pass a finite mean and standard deviation, or leave the prior out")
         else:
             result[name] = (float(pair[0]), float(pair[1]))
     return result
@@ -284,6 +301,11 @@ def _guess(module: Module, experiment: Experiment, state: str) -> float:
             if isinstance(given, Mapping):
                 given = {str(name_of(key)): v for key, v in given.items()}.get(state)
             elif given is not None:
-                given = list(np.ravel(given))[names.index(state)] if len(np.ravel(given)) == len(names) else None
-            return float(module.metadata.initial.get(state, 0.0) if given is None else given)
+                row = list(np.ravel(given))
+                if len(row) != len(names):
+                    raise ArgumentError(f"{module.name}: {group} of an experiment has {len(row)} numbers, needed are "
+                                        f"{len(names)}: {', '.join(names)}")
+                given = row[names.index(state)]
+            guess = module.metadata.initial.get(state, 0.0) if given is None else given
+            return number_of(guess, module.name, f"{state} at the start of an experiment must be a number")
     raise AssertionError(state)

@@ -145,6 +145,15 @@ def test_faults_of_data(change: dict[str, Any], text: str) -> None:
     ((sd.Experiment(T, {"q": T}), ["m"], (), {"m": (2, 3)}), "the guess 1 of m is not inside its bounds (2, 3)"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), {"m": 2}), "bounds of m is 2; pass a pair of numbers"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), None, None, {"r": 1}), "noise has 'r', which is not measured; noise of q"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), [(0, 1)], [(0, 1)], None, [1.0]),
+     "start is [1.0]; pass a dictionary from names to values, such as {l: 1.0}; bounds is [(0, 1)]; pass a dictionary from names "
+     "to values, such as {l: (0.5, 2.0)}; priors is [(0, 1)]; pass a dictionary"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), None, {"m": (np.inf, 1)}), "priors of m is (inf, 1); pass a finite mean"),
+    ((sd.Experiment(T, {"q": T}, q=[0.5, 0.3]), ["m"], ["q"]), "q of an experiment has 2 numbers, needed are 1: q"),
+    ((sd.Experiment(T, {"q": T}, q={"q": "x"}), ["m"], ["q"]), "q at the start of an experiment must be a number, found 'x'"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), None, None, None, None, 1e-8, "dop853", 0), "max_steps is 0; pass a whole number"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), None, None, None, None, -1), "damped: tolerances must be positive, found rtol = -1"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), None, None, None, None, 1e-8, "euler"), "damped: there is no method 'euler'"),
 ])
 def test_faults_of_what_is_fitted(arguments: tuple[Any, ...], text: str) -> None:
     with pytest.raises(ArgumentError) as found:
