@@ -149,12 +149,9 @@ class _Problem:
             self._at = None
             try:
                 motions = [self._run(k, values) for k in range(len(self.experiments))]
-            except ArgumentError:
-                if self.runs == 1:  # what was asked is at fault, not where the iteration has gone
-                    raise
-                self.failure = "its arguments are out of range"
-                return False
             except SymdynError as error:
+                if isinstance(error, ArgumentError) and self.runs == 1:
+                    raise  # what was asked is at fault, not where the iteration has gone
                 self.failure = str(error)
                 return False
             stopped = next((m for m in motions if not m.success), None)
