@@ -28,7 +28,8 @@ from symdyn.runtime.solutions.validity import WATCHES, warn
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
-    from symdyn.runtime.module import Module
+    from symdyn.given import Values
+    from symdyn.runtime.module import InputValues, Module
 
 # Where `fun` is compared with the right-hand side: at the start, and at a part of the span with every entry of the state moved.
 _PART, _MOVED = 0.618, 0.01
@@ -44,11 +45,11 @@ class Setting:
     method: str
     p: np.ndarray
     inputs: Callable[[tuple[float, float] | None], Inputs]
-    stabilization: Any
+    stabilization: str | tuple[str, float] | None
 
     @classmethod
-    def of(cls, module: Module, method: Any, params: Any, inputs: Any, events: Any, stabilization: Any, interpolation: str,
-           extend: str) -> Setting:
+    def of(cls, module: Module, method: str, params: Values | None, inputs: InputValues | None, events: bool,
+           stabilization: str | tuple[str, float] | None, interpolation: str, extend: str) -> Setting:
         """Raises ArgumentError for what steps that SciPy asks for one by one cannot do."""
         if not is_compiled(method):
             raise ArgumentError(f"{module.name}: a solver by the method {shown(method)} asked for; there are "
@@ -67,7 +68,8 @@ class Setting:
         return cls(module, method, real_parameters(module, params), taken, stabilization)
 
 
-def _taken(module: Module, given: Any, interpolation: str, extend: str, span: tuple[float, float] | None) -> Inputs:
+def _taken(module: Module, given: InputValues | None, interpolation: str, extend: str,
+           span: tuple[float, float] | None) -> Inputs:
     """Inputs over a span. Raises ArgumentError as simulate does, and for controllers whose values are held."""
     about = module.metadata
     free = take_inputs(given, about.inputs, about.initial, module.name, span, interpolation, extend, about.motions)
