@@ -138,12 +138,24 @@ def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
     return [k >= 0 and bool(values[k] > 0) for k in own]
 
 
-def check_counted(module: Module) -> None:
-    """Raise ArgumentError for contacts that are ignored at times, where steps of one length go across switches."""
-    names = [record.name for record in module.metadata.contacts if IGNORED in record.events]
+def not_stepped(records: Sequence[ContactRecord]) -> list[str]:
+    """What of contacts method="moreau" does not take, whose steps of one length go across switches: parts of a message."""
+    found = []
+    elements = dict.fromkeys(record.contact for record in records if record.kind in (CLUTCH, FRICTION))
+    if elements:
+        found.append("method='moreau' takes what has a gap that closes: contacts of bodies, stops, backlash and ropes, not "
+                     f"clutches or dry friction of joints ({', '.join(elements)}); leave out the method, and switches are "
+                     "located")
+    others = {record.contact: record.impact for record in records if record.impact != "newton"}
+    if others:
+        found.append("method='moreau' has Newton's law of impacts; "
+                     + ", ".join(f"{contact} has impact={impact!r}" for contact, impact in others.items())
+                     + ": pass impact='newton', or leave out the method")
+    names = [record.name for record in records if IGNORED in record.events]
     if names:
-        raise ArgumentError(f"{module.name}: contacts {', '.join(names)} are ignored at times, which method='moreau' does not "
-                            "know; leave out the method, and switches are located")
+        found.append(f"contacts {', '.join(names)} are ignored at times, which method='moreau' does not know; leave out the "
+                     "method, and switches are located")
+    return found
 
 
 def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
@@ -348,11 +360,10 @@ class _Phases:
         self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}
         self._wait(t)
         if self.at_once >= MOST_SWITCHES:
-            counted = all(record.kind not in (CLUTCH, FRICTION) and record.impact == "newton" and IGNORED not in record.events
-                          for record in self.records)
             raise _Stop(f"the modes of contacts do not settle: {self.at_once} switches within {self.same:.3g} s, the latest of "
                         f"{self.latest}; a compliant contact where they touch, or other coefficients, leave one mode"
-                        + "; method='moreau' with a step goes across them without locating switches" * counted)
+                        + "; method='moreau' with a step goes across them without locating switches"
+                        * (not not_stepped(self.records)))
 
     def _phase(self, t: float, x: np.ndarray) -> Outcome:
         """From one switch to the next."""

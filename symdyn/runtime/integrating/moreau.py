@@ -12,13 +12,12 @@ import numpy as np
 
 from symdyn.backend.c_records import codes_of
 from symdyn.backend.right_side import RightSide
-from symdyn.contact_kinds import CLUTCH, FRICTION
 from symdyn.errors import ArgumentError
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.inputs.inputs import Inputs
-from symdyn.runtime.integrating.contacts import SHARED, SOFTNESS
+from symdyn.runtime.integrating.contacts import SHARED, SOFTNESS, not_stepped
 from symdyn.runtime.integrating.moreau_groups import SPHERES, add_groups, n_speeds, room_of
 from symdyn.runtime.integrating.moreau_memory import MOST_DENSE, Cones, Memory, Moreau, cones
 from symdyn.runtime.integrating.outcome import Outcome, Phase, Request, Stepped, Touched
@@ -63,16 +62,9 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
     if not metadata.contacts and not metadata.contact_groups:
         raise ArgumentError(f"{name}: method='moreau' is for rigid contacts, of which there are none; pass another method, or "
                             "add_contact")
-    elements = [c.contact for c in metadata.contacts if c.kind in (CLUTCH, FRICTION)]
-    if elements:
-        raise ArgumentError(f"{name}: method='moreau' takes what has a gap that closes: contacts of bodies, stops, backlash and "
-                            f"ropes, not clutches or dry friction of joints ({', '.join(dict.fromkeys(elements))}); leave out "
-                            "the method, and switches are located")
-    others = {c.contact: c.impact for c in metadata.contacts if c.impact != "newton"}
-    if others:
-        raise ArgumentError(f"{name}: method='moreau' has Newton's law of impacts; "
-                            + ", ".join(f"{contact} has impact={impact!r}" for contact, impact in others.items())
-                            + ": pass impact='newton', or leave out the method")
+    faults = not_stepped(metadata.contacts)
+    if faults:
+        raise ArgumentError(f"{name}: {'; '.join(faults)}")
     if request.span[1] < request.span[0]:
         raise ArgumentError(f"{name}: rigid contacts lose energy, so that motions with them do not run backward in time; pass an "
                             "end after the start")

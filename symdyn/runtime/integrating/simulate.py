@@ -24,7 +24,7 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.automatic import automatic
 from symdyn.runtime.integrating.charts import warn_near_lock
 from symdyn.runtime.integrating.compiled import run_compiled
-from symdyn.runtime.integrating.contacts import check_counted, check_overlap, run_contacts
+from symdyn.runtime.integrating.contacts import check_overlap, run_contacts
 from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
@@ -113,7 +113,6 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                                 "pass method='moreau' with a step, such as step=2e-3 (in s)")
         if method == MOREAU:
             check_moreau(module, request, stabilization)
-            check_counted(module)
         if method == "ggl":
             from symdyn.runtime.integrating.dae_run import check_ggl
 
