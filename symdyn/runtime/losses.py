@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, UnsupportedExpression
+from symdyn.runtime.raised import called
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
     places = [module.metadata.parameters.index(name) if name in module.metadata.parameters else -1 for name in by]
 
     def one(t: float, x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        returned = given(t, x.copy(), p.copy())
+        returned = called(given, t, x, f"{module.name}: the function for {what} of the loss", (t, x.copy(), p.copy()))
         try:
             value, by_x, *rest = returned
             by_p = np.asarray(rest[0] if rest else np.zeros(n_p), dtype=float)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import linecache
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -28,11 +28,11 @@ class InputRaised(EvaluationError):
         return str(self.args[0])
 
 
-def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, of_time: bool = False) -> Any:
-    """What a function of inputs returns; what: how messages call it; of_time: it takes t alone. Raises InputRaised from whatever
-    the function raises."""
+def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, arguments: Sequence[Any]) -> Any:
+    """What a function of the user returns, asked at t and x for these arguments; what: how messages call it. Raises InputRaised
+    from whatever the function raises."""
     try:
-        return function(t) if of_time else function(t, x)
+        return function(*arguments)
     except InputRaised:
         raise
     except Exception as error:  # whatever it is, it is the user's

@@ -164,6 +164,8 @@ def test_what_has_no_gradient() -> None:
         module().gradient(sd.Loss(integral=sp.log(Q1)), **asked)
     with pytest.raises(EvaluationError, match="the end of the loss has a derivative that is inf at t = 1 s"):
         module().gradient(sd.Loss(end=lambda t, x, p: (0.0, np.array([np.inf, 0, 0, 0]))), **asked)
+    with pytest.raises(EvaluationError, match=r"the function for the end of the loss raised ZeroDivisionError: .*, in line"):
+        module().gradient(sd.Loss(end=lambda t, x, p: 1 / 0), **asked)
     with pytest.raises(ArgumentError, match="the gradient has no 'm2'; it is by l1"):
         module().gradient(END, **asked)["m2"]
 

@@ -70,7 +70,7 @@ class Followed:
             assert self.pieces is not None
             return self.pieces.at(t)
         function = self.function
-        given = called(function, t, x, f"the motion {self.name}", of_time=True)
+        given = called(function, t, x, f"the motion {self.name}", (t,))
         try:
             values, why = real(given).reshape(-1), ""
         except NotReal as error:

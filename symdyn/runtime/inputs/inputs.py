@@ -113,7 +113,7 @@ class Inputs:
         InputRaised from what these raise, ArgumentError for what does not fit."""
         found = np.zeros((len(self.constant), len(columns)))
         for places, gradient, what in self.gradients:
-            given = called(gradient, t, x.copy(), what)
+            given = called(gradient, t, x, what, (t, x.copy()))
             try:
                 rows = np.asarray(given, dtype=float).reshape(len(places), len(x))
             except (TypeError, ValueError):
@@ -380,7 +380,7 @@ def varies_over_time(given: Any) -> bool:
 
 
 def _asked(function: Callable[[float, np.ndarray], Any], what: str, t: float, x: np.ndarray) -> Any:
-    return called(function, t, x, what)
+    return called(function, t, x, what, (t, x))
 
 
 def _table(given: Any, for_pairs: Table, names: Sequence[str], owner: str, span: tuple[float, float] | None) -> Table:

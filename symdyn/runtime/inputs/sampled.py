@@ -78,7 +78,7 @@ class Sampler:
 
     def values(self, t: float, x: np.ndarray) -> np.ndarray:
         """What the function says, (n,). Raises InputRaised from what it raises, ArgumentError for what does not fit."""
-        given = called(self.sampled.function, t, x.copy(), self.what)
+        given = called(self.sampled.function, t, x, self.what, (t, x.copy()))
         try:
             values = np.asarray(given, dtype=float).reshape(-1)
         except (TypeError, ValueError):
@@ -92,7 +92,7 @@ class Sampler:
     def columns(self, t: float, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Derivatives of the values along columns (k, n_x) of sensitivities, (n, k), by the gradient. Raises as `values`."""
         assert self.sampled.gradient is not None
-        given = called(self.sampled.gradient, t, x.copy(), f"the gradient of {self.what}")
+        given = called(self.sampled.gradient, t, x, f"the gradient of {self.what}", (t, x.copy()))
         try:
             rows = np.asarray(given, dtype=float).reshape(len(self.places), len(x))
         except (TypeError, ValueError):
