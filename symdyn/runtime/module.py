@@ -505,9 +505,12 @@ class Module:
         rows = []
         for what, value, size in (("weights", weights, self.metadata.sizes.x), ("along", along, n)):
             numbers = real_of(value, self.name, f"{what} must be numbers")
-            if numbers.ndim > 2 or numbers.shape[-1:] != (size,) or not np.isfinite(numbers).all():
+            if numbers.ndim > 2 or numbers.shape[-1:] != (size,):
                 raise ArgumentError(f"{self.name}: {what} has the shape {numbers.shape}; pass {size} finite numbers, or "
                                     "rows of them")
+            if not np.isfinite(numbers).all():
+                raise ArgumentError(f"{self.name}: {what} has {numbers[~np.isfinite(numbers)][0]}; pass {size} finite numbers, "
+                                    "or rows of them")
             rows.append(numbers)
         length = max(len(np.atleast_2d(r)) for r in rows)
         flat = [np.zeros(self.metadata.sizes.u), *rows]
