@@ -9,6 +9,7 @@ Coleman and Li (1999) for bounds, as in scipy.optimize.least_squares.
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from symdyn.errors import ArgumentError, EvaluationError, SymdynError
+from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning, SymdynError
 from symdyn.estimation.experiment import Experiment, Measured, taken
 from symdyn.estimation.result import Fit, Unknown
 from symdyn.real_numbers import number_of
@@ -148,7 +149,10 @@ class _Problem:
             self.runs += 1
             self._at = None
             try:
-                motions = [self._run(k, values) for k in range(len(self.experiments))]
+                with warnings.catch_warnings():
+                    if self.runs > 1:  # what warnings say of a motion they said of the first; why one ends is in `failure`
+                        warnings.simplefilter("ignore", SimulationWarning)
+                    motions = [self._run(k, values) for k in range(len(self.experiments))]
             except SymdynError as error:
                 if isinstance(error, ArgumentError) and self.runs == 1:
                     raise  # what was asked is at fault, not where the iteration has gone

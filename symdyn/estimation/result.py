@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 # Singular values of the scaled derivatives below this part of the largest say that a combination is not determined: the
 # sensitivities are accurate to about this.
 UNDETERMINED = 1e-7
+# An unknown that went further than so many times the size of its guess, and is less sure than it went, has run off.
+FAR = 100.0
 
 
 @dataclass(frozen=True)
@@ -95,9 +97,18 @@ class Fit(Estimate):
         else:
             half = (vectors.T / sizes) * scale[:, None]
             covariance = half @ half.T * (1.0 if known else estimate**2)
+        guesses = np.array([u.guess for u in unknowns])
+        success, message = bool(found.status > 0), str(found.message)
+        way = np.abs(found.x - guesses)
+        lost = (way > FAR * scale) & (np.sqrt(np.diag(covariance)) > way)
+        if lost.any():
+            success = False
+            message = "ran off to where the data say nothing: " + ", ".join(
+                f"{label} from {guess:g}" for label, guess, off in zip(labels, guesses, lost, strict=True) if off
+            ) + "; give bounds or priors, or another start"
         return cls(module, dict(zip(labels, map(float, found.x), strict=True)), covariance, estimate,
-                   tuple(combination(v, labels) for v in vectors[open_ones]), tuple(motions), dict(residuals),
-                   bool(found.status > 0), str(found.message), runs, degrees, known)
+                   tuple(combination(v, labels) for v in vectors[open_ones]), tuple(motions), dict(residuals), success, message,
+                   runs, degrees, known)
 
     def plot(self, path: PathName | None = None) -> Figure:
         """Measured values, motion, and residuals over time; written to a file if a path is given."""

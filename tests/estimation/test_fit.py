@@ -108,6 +108,16 @@ def test_bounds_hold_and_motions_that_fail_are_steps_not_taken() -> None:
         sd.fit(module, sd.Experiment(t, {x: truth.q[:, 0]}), [k], start={k: 400})
 
 
+def test_what_runs_off_is_no_minimum() -> None:
+    """From a negative length the pendulum is upside down, and the longer it is the nearer it stays to where it is let go."""
+    module = sd.systems.pendulum().compile()
+    truth = module.simulate(np.linspace(0, 2, 50), q=[0.5])
+    found = sd.fit(module, sd.Experiment(truth.t, {"q1": truth.q[:, 0]}, q=[0.5]), ["l"], start={"l": -1.0})
+    assert not found.success
+    assert found.message == "ran off to where the data say nothing: l from -1; give bounds or priors, or another start"
+    assert sd.fit(module, sd.Experiment(truth.t, {"q1": truth.q[:, 0]}, q=[0.5]), ["l"], start={"l": 0.7}).success
+
+
 def test_picture(tmp_path: Path) -> None:
     found = sd.fit(damped(), [measured(1), measured(2)], ["d", "m"])
     figure = found.plot(tmp_path / "fit.png")
