@@ -25,6 +25,10 @@ PAGES = ("index", "describing_mechanisms", "printing", "measured", "gallery", "g
          "reference/system", "reference/module", "contributing", "genindex")
 
 
+# The site is built once by each process that needs it; tests that stand at the front of the run stay in one.
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("sphinx")
