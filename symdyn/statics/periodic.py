@@ -36,6 +36,11 @@ ITERATIONS, LARGEST, HALVINGS = 50, 0.2, 8
 CLOSED = 1e3
 # Singular values of Newton's matrix that do not count: where periodic motions of other energies are near, more of them.
 LEFT_OUT = (1e-9, 1e-4)
+# Until when, by the guess of the period, and at how many times the return of a motion is looked for.
+LATEST, RETURNS = 1.5, 601
+# A start that moves less in a period than this part of what the first one did, or than so many times what counts as closed, is
+# at rest.
+STILL, AT_REST = 1e-6, 1e2
 # Directions that a start may change in: singular values of the projection beyond this part of the largest.
 TANGENT = 1e-6
 # What a change of a cyclic coordinate may change of the rest, by its size.
@@ -64,11 +69,19 @@ class PeriodicMotion:
 
     @property
     def stable(self) -> bool:
-        """Whether all disturbances but a shift along the motion die out."""
-        rest = np.abs(self.multipliers)
+        """Whether all disturbances but a shift along the motion die out, beyond the error of the multipliers.
+
+        Multipliers that fall together with that of the shift, as where motions of all amplitudes are periodic, are known to the
+        square root of the error only; their product is known as well as a single one.
+        """
+        sizes, error = np.abs(self.multipliers), CLOSED * self._problem.rtol
         if self.free_period:
-            rest = np.delete(rest, np.argmin(np.abs(self.multipliers - 1)))
-        return bool((rest < 1).all())
+            away = np.abs(self.multipliers - 1)
+            together = away < np.sqrt(error)
+            if together.sum() > 1 and sizes[together].prod() > 1 - error:
+                return False
+            sizes = np.delete(sizes, np.argmin(away))
+        return bool((sizes < 1 - error).all())
 
     def simulate(self, n: int = 201) -> Solution:
         """The motion over a period, at n times."""
@@ -187,14 +200,56 @@ class _Problem:
     modes: tuple[str, ...] = ()  # of rigid contacts at the start
 
     def solve(self, x: np.ndarray, period: float) -> PeriodicMotion:
-        """The periodic motion near a start and a period."""
+        """The periodic motion near a start and a period.
+
+        A state of rest comes back after any time, and where motions of all amplitudes are periodic Newton's method may end in one
+        or go from one to the next; then the period of the motion from this start is sought.
+        """
+        why = at_rest = None
+        for fixed in (False, True) if self.free else (False,):
+            try:
+                found = self.nearest(x, self.returns(self.start(x), period) if fixed else period, fixed)
+            except (NoEquilibrium, EvaluationError) as error:
+                why = why or error
+            else:
+                if not self.rests(found, self.way(self.start(x), period)):
+                    return found
+                at_rest = at_rest or found
+        if at_rest is None:
+            assert why is not None
+            raise why
+        where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.module.metadata.x, at_rest.x, strict=True))
+        raise NoEquilibrium(f"{self.module.name}: near the start is a state of rest, which comes back after any time ({where}), "
+                            f"and no motion with a period of about {period:.6g} s was found; begin further from it, with a state "
+                            "that a simulation has settled to")
+
+    def returns(self, x: np.ndarray, period: float) -> float:
+        """When, within half to one and a half of a guess, the motion from a start comes nearest to it, each entry of the state by
+        its range."""
+        run = self.solution(x, LATEST * period, RETURNS)
+        gaps = (run.x @ self.back.T - self.keeps * x - self.moves)[:, self.keeps > 0]
+        sizes = np.ptp(run.x[:, self.keeps > 0], axis=0)
+        far = np.linalg.norm(gaps[:, sizes > 0] / sizes[sizes > 0], axis=1)
+        return float(run.t[int(np.where(run.t - self.t < period / 2, np.inf, far).argmin())] - self.t)
+
+    def rests(self, motion: PeriodicMotion, first: float) -> bool:
+        """Whether the period is free and nothing moves; first: the way of the first start in a period."""
+        return self.free and self.way(motion.x, motion.period) <= max(STILL * first, AT_REST * self.enough(motion.x, motion.x))
+
+    def way(self, x: np.ndarray, period: float) -> float:
+        """What a start changes in a period at its rate, the largest entry."""
+        modes = self.solution(x, period, 2)._phases
+        return float(np.abs(self.keeps * self.rate(self.t, x, modes[0].p if modes else self.p)).max() * period)
+
+    def nearest(self, x: np.ndarray, period: float, fixed: bool) -> PeriodicMotion:
+        """What comes back near a start and a period, by Newton's method; fixed: the start stays, its period is sought."""
         x = self.start(x)
         here = self.shot(x, period)
         scale, enough = _size(x, here.end), self.enough(x, here.end)
         for iteration in range(ITERATIONS):
             if np.abs(here.gap).max() <= enough:
                 return self.found(here, iteration)
-            better = (self.nearer(here, self.solved(here, -here.gap, left_out), scale) for left_out in LEFT_OUT)
+            better = (self.nearer(here, self.solved(here, -here.gap, left_out, fixed), scale) for left_out in LEFT_OUT)
             there = next((one for one in better if one is not None), None)
             if there is None:
                 break
@@ -262,12 +317,14 @@ class _Problem:
         inputs = () if self.inputs is None else self.inputs
         return self.module.evaluate("rhs", t, x, p, inputs)
 
-    def solved(self, at: _Shot, right: np.ndarray, left_out: float = 1e-9) -> np.ndarray:
+    def solved(self, at: _Shot, right: np.ndarray, left_out: float = 1e-9, fixed: bool = False) -> np.ndarray:
         """Changes of the start and of the period by which what is left after a period changes as given, the smallest ones;
-        singular values below this part of the largest are left out."""
-        columns = [at.moved - at.basis]
+        singular values below this part of the largest are left out; fixed: the start stays."""
+        n = 0 if fixed else at.basis.shape[1]
+        basis, moved = at.basis[:, :n], at.moved[:, :n]
+        columns = [moved - basis]
         if self.free:  # and the start does not slide along the motion
-            along = at.basis.T @ at.rate
+            along = basis.T @ at.rate
             columns.append(at.late[:, None])
             size = max(float(np.linalg.norm(along)), 1e-300)
             matrix = np.vstack([np.hstack(columns), np.append(along / size, 0.0)])
@@ -275,8 +332,7 @@ class _Problem:
         else:
             matrix = columns[0]
         found = np.linalg.lstsq(matrix, right, rcond=left_out)[0]
-        n = at.basis.shape[1]
-        return np.append(at.basis @ found[:n], found[n] if self.free else 0.0)
+        return np.append(basis @ found[:n], found[n] if self.free else 0.0)
 
     def derivative(self, x: np.ndarray, period: float, name: str) -> np.ndarray:
         """Derivatives of the start and of the period by a parameter, (n_x + 1,)."""

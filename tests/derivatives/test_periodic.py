@@ -210,6 +210,49 @@ def test_on_constraints() -> None:
     assert len(orbit.multipliers) == 2 and np.prod(orbit.multipliers) == pytest.approx(1, abs=1e-6)
 
 
+def hanging(damping: float = 0.0) -> Any:
+    """A pendulum without inertia about its mass, 2 m long."""
+    q = sd.coordinates("q")
+    system = sd.System("hanging", gravity=[0, -9.81])
+    bob = system.add_body("bob", mass=1, inertia=0, com=[0, -2])
+    hinge = system.add_joint(sd.Revolute("hinge", system.ground, bob, q))
+    system.add_joint_force(hinge, -damping * q.dot, name="friction")
+    return system.embedding().compile()
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 0.5, 2.0, 3.0])
+def test_swings_of_a_pendulum_against_elliptic_integrals(amplitude: float) -> None:
+    """Swings of every amplitude are periodic; one of them is found, and not the state of rest, which always comes back."""
+    period = float(4 * mp.sqrt(2 / mp.mpf("9.81")) * mp.ellipk(mp.sin(amplitude / 2) ** 2))
+    for guess in (0.7 * period, 0.93 * period, 1.05 * period, 1.3 * period):
+        swing = hanging().periodic(guess, [amplitude], [0.0], rtol=1e-12)
+        assert np.abs(swing.simulate().q).max() > 0.5 * amplitude
+        found = float(np.abs(swing.simulate(4001).q).max())
+        assert swing.period == pytest.approx(float(4 * mp.sqrt(2 / mp.mpf("9.81")) * mp.ellipk(mp.sin(found / 2) ** 2)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("mu", "stable"), [(1e-4, True), (-1e-4, False), (0.0, False)])
+def test_verdicts_beside_a_double_multiplier(mu: float, stable: bool) -> None:
+    """Van der Pol's cycle of amplitude 2 has the multiplier exp(-2 pi mu) for small mu; without damping both are 1, and the error of
+    a double eigenvalue is the square root of that of the motion."""
+    found = oscillator().periodic(6.0, [2.0], [0.0], {"mu": mu})
+    assert found.stable is stable
+    assert np.prod(found.multipliers).real == pytest.approx(np.exp(-2 * np.pi * mu), abs=1e-6)
+
+
+def test_linear_oscillator_keeps_its_amplitude() -> None:
+    """Newton's method alone goes to rest in one step, whatever the period."""
+    swing = oscillator().periodic(6.0, [0.1], [0.0], {"mu": 0, "k": 2.0})
+    assert swing.period == pytest.approx(2 * np.pi / np.sqrt(2), rel=1e-9) and swing.x[0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("damping", "start"), [(0.5, 0.3), (0.0, 0.0)])
+def test_states_of_rest_are_no_periodic_motions(damping: float, start: float) -> None:
+    with pytest.raises(NoEquilibrium, match=r"near the start is a state of rest, which comes back after any time \(q = .*, "
+                                            r"q_dot = .*\), and no motion with a period of about 3 s was found; begin further"):
+        hanging(damping).periodic(3.0, [start], [0.0])
+
+
 def test_what_is_not_found() -> None:
     with pytest.raises(NoEquilibrium, match=r"no periodic motion found near the start with the period 2 s: after .* is off by"):
         q = sd.coordinates("q")
