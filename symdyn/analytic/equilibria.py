@@ -37,8 +37,10 @@ if TYPE_CHECKING:
 
 # Cases that are followed; a mechanism of n links has 2^n positions of rest.
 CASES = 4096
-# Numbers of 30 digits below this are zero.
-ZERO = 1e-20
+# Numbers of 30 digits below this are zero; those of expressions at numbers for parameters, which may cancel.
+ZERO, NEAR = 1e-20, 1e-12
+# Numbers for parameters that are tried until one meets the conditions.
+SAMPLES = 20
 
 
 @dataclass(frozen=True)
@@ -494,29 +496,13 @@ class _Search:
     # -- what is found
 
     def _point(self, case: _Case) -> EquilibriumPoint | None:
-        """Coordinates of a case; None where it contradicts itself."""
-        angles = dict(case.angles)
+        """Coordinates of a case; None where it contradicts itself. Raises SymdynError where what was found is none."""
         values = {x: e for x, e in case.found if x in self.unknown}
-        free = [x for x in (*self.coordinates, *self.multipliers) if x not in self.turning and x not in values]
-        for k in self.pairs:
-            if k not in angles:
-                angles[k] = sp.Dummy("free")
+        free = [x for x in self.unknown if x not in self.turning and x not in values]
         if self.pairs:
-            rows, right = [], []
-            for k in self.pairs:
-                base = self.exact.bases[k]
-                rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
-                constant = sp.Add(*[number(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
-                                    if not set(term) & self.unknown_leaves])
-                right.append(angles[k] - constant)
-            matrix = sp.Matrix(rows)
-            for q, value in zip(self.turning, matrix.LUsolve(sp.Matrix(right)), strict=True):
-                value = sp.expand(value) if value.has(sp.pi) else value
-                values[q] = _within_turn(value)
-        loose = {s for e in values.values() for s in e.atoms(sp.Dummy)}
-        if loose:
-            free += [q for q, e in values.items() if e.atoms(sp.Dummy)]
-            values = {q: e for q, e in values.items() if not e.atoms(sp.Dummy)}
+            turned, letters = self._turned(dict(case.angles))
+            free += [q for q in self.turning if q not in turned]
+            values = {x: e.subs(letters) for x, e in {**values, **turned}.items()}
         if any(c == False for c in case.conditions):  # noqa: E712
             return None
         ordered = {x: values[x] for x in self.unknown if x in values}
@@ -524,7 +510,43 @@ class _Search:
         proved = all(e == 0 or _proved(e) for e in residuals)
         if not proved and any(not e.free_symbols and not _vanishes(e) for e in residuals):
             return None
+        wrong = [] if proved else [e for e in residuals if e.free_symbols and not _fulfilled(e, case.conditions)]
+        if wrong:
+            where = ", ".join(f"{x} = {e}" for x, e in ordered.items())
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but {where} leaves "
+                              f"{shown(wrong[0])}, which is not zero; use module.equilibria()")
         return EquilibriumPoint(ordered, tuple(free), tuple(dict.fromkeys(case.conditions)), proved)
+
+    def _turned(self, angles: dict[int, sp.Expr]) -> tuple[dict[sp.Symbol, sp.Expr], dict[sp.Symbol, sp.Expr]]:
+        """Coordinates within angles, from base angles; and sines and cosines of base angles that may have any value. These leave
+        as many coordinates free, the first ones that determine them, in which the others are written."""
+        loose = {k: sp.Dummy(f"angle{k}", real=True) for k in self.pairs if k not in angles}
+        rows, right = [], []
+        for k in self.pairs:
+            base = self.exact.bases[k]
+            rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
+            constant = sp.Add(*[number(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
+                                if not set(term) & self.unknown_leaves])
+            right.append({**angles, **loose}[k] - constant)
+        found = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))
+        if not loose:
+            return {q: _whole(value) for q, value in found.items()}, {}
+        unknown, letters = list(loose.values()), {s for k in loose for s in self.pairs[k]}
+        leading: list[sp.Symbol] = []
+        for q, value in found.items():
+            slopes = sp.Matrix([[found[x].coeff(d) for d in unknown] for x in (*leading, q)])
+            if not value.free_symbols & letters and slopes.rank() == len(leading) + 1:
+                leading.append(q)
+        if len(leading) < len(unknown):
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but at some of them "
+                              f"{', '.join(str(q) for q in found)} depend on each other; fix some of them, or use "
+                              "module.equilibria()")
+        slopes = sp.Matrix([[found[q].coeff(d) for d in unknown] for q in leading])
+        at_zero = dict.fromkeys(unknown, sp.S.Zero)
+        solved = dict(zip(unknown, slopes.LUsolve(sp.Matrix([q - found[q].subs(at_zero) for q in leading])), strict=True))
+        known = {letter: function(sp.expand(solved[d])) for k, d in loose.items()
+                 for letter, function in zip(self.pairs[k], (sp.sin, sp.cos), strict=True)}
+        return {q: _whole(sp.expand(value.subs(solved)).subs(known)) for q, value in found.items() if q not in leading}, known
 
 
 def _decimal(value: Any) -> Any:
@@ -540,6 +562,23 @@ def _proved(e: sp.Expr) -> bool:
 def _vanishes(e: sp.Expr) -> bool:
     """Whether a number is zero to 30 digits."""
     return not e.free_symbols and bool(abs(e.evalf(30)) < ZERO)
+
+
+def _fulfilled(e: sp.Expr, conditions: Sequence[sp.Basic]) -> bool:
+    """Whether an expression is zero to 30 digits at numbers for its symbols that meet the conditions, as far as any are found."""
+    symbols = sorted(set().union(e.free_symbols, *(c.free_symbols for c in conditions)), key=str)
+    for k in range(SAMPLES):
+        # Fractions of different primes; half of the samples have both signs where a symbol may be negative.
+        numbers = {x: sp.Rational(sp.prime(3 + k + 5 * j), sp.prime(4 + 2 * k + 3 * j)) for j, x in enumerate(symbols)}
+        numbers = {x: -v if k % 2 and j % 2 and x.is_negative is not False else v for j, (x, v) in enumerate(numbers.items())}
+        if all(c.subs(numbers) == True for c in conditions):  # noqa: E712
+            return bool(abs(e.subs(numbers).evalf(30)) < NEAR)
+    return True
+
+
+def _whole(value: sp.Expr) -> sp.Expr:
+    """An angle; between -pi and pi where it is a multiple of pi."""
+    return _within_turn(sp.expand(value) if value.has(sp.pi) else value)
 
 
 def _plain(e: sp.Expr) -> sp.Expr:

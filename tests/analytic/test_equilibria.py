@@ -74,6 +74,49 @@ def test_free_coordinates_and_none_at_all():
     assert told(held) == ["q2 = pi/2", "q2 = -pi/2"]
 
 
+def left_over(eq, point, rng):
+    """Forces at a point with random numbers for what is free and for parameters."""
+    s = eq.symbols
+    numbers = {x: rng.uniform(0.3, 2.0) for x in (*s.parameters, *point.free)}
+    values = {q: float(sp.sympify(e).subs(numbers)) for q, e in point.values.items()}
+    at = {**numbers, **values, **dict.fromkeys((*s.speeds, *s.inputs), 0.0)}
+    forces = eq.F_tilde - eq.k_tilde
+    if eq.constraints:
+        forces += eq.C_r.T * sp.Matrix([sp.Symbol(f"lambda{k + 1}") for k in range(eq.C_r.rows)])
+    return np.array(forces.subs(at), dtype=float)
+
+
+def test_coordinates_that_follow_free_ones():
+    """A sleigh's spring, which pulls a point on a bar that may have any direction, is slack; a link that is held by its absolute
+    angle turns back as much as the one before it turns."""
+    rng = np.random.default_rng(3)
+    sleigh = sd.systems.get("sleigh").augmented()
+    assert told(sleigh.equilibria()) == ["y = -a*sin(theta), lambda1 = 0, x free, theta free"]
+    q1, q2 = sd.coordinates("q1 q2")
+    alpha = sd.parameters("alpha")
+    system = sd.System("held", gravity=[0, 0])
+    one, two = system.add_body("one", mass=m, inertia=m), system.add_body("two", mass=m, inertia=m, com=[1, 0])
+    system.add_joint(sd.Revolute("first", system.ground, one, q1))
+    elbow = system.add_joint(sd.Revolute("second", one, two, q2))
+    system.add_joint_force(elbow, -k * sp.sin(q1 + q2 - alpha))
+    held = system.embedding()
+    assert told(held.equilibria()) == ["q2 = alpha - q1, q1 free", "q2 = alpha - q1 + pi, q1 free"]
+    for eq in (sleigh, held):
+        for point in eq.equilibria():
+            assert np.abs(left_over(eq, point, rng)).max() < 1e-12
+
+
+def test_what_is_no_equilibrium_is_an_error(monkeypatch):
+    """Each point is put into the equations, at numbers for parameters where exact algebra cannot decide."""
+    import symdyn.analytic.equilibria as place
+
+    monkeypatch.setattr(place, "_proved", lambda e: False)
+    assert len(hoop().equilibria({"phi_dot": Omega})) == 4
+    monkeypatch.setattr(place._Search, "_circle", lambda self, a, b, d: [(sp.S.Zero, sp.S.One, sp.pi / 3, [])])
+    with pytest.raises(SymdynError, match=r"but theta = pi/3 leaves .*, which is not zero; use module.equilibria\(\)"):
+        hoop().equilibria({"phi_dot": Omega})
+
+
 def test_multipliers_of_a_pendulum_by_hand():
     x, y = sd.coordinates("x y")
     eq = sd.augmented([x, y], mass=[m, m], force=[0, -m * g], constraints=[x**2 + y**2 - l**2])
