@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +31,6 @@ from symdyn.report.limit import TimeUp, within
 from symdyn.shown import shown
 from symdyn.tape.jumps import description, jumps
 from symdyn.tape.node import SPEED, Node, is_zero
-from symdyn.tape.sympy_bridge import number
 
 if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
@@ -244,7 +244,7 @@ class _Search:
                 self.letters[k] = self.writer.expression(k)
                 continue
             e = self.writer.expression(k)
-            if leaf is None and e.free_symbols & set(self.unknown):
+            if e.free_symbols & set(self.unknown):
                 raise SymdynError(f"{name}: equilibria in closed form were requested, but the conditions hold {shown(e)}, which "
                                   "is no polynomial; use module.equilibria()")
             self.letters[k] = e
@@ -256,7 +256,7 @@ class _Search:
         self.turning = angles
 
     def _polynomial(self, num: Any) -> sp.Expr:
-        return sp.Add(*[sp.Mul(number(c), *[self.letters[k] ** n for k, n in m]) for m, c in plain(num).items()])
+        return sp.Add(*[sp.Mul(_exact(c), *[self.letters[k] ** n for k, n in m]) for m, c in plain(num).items()])
 
     # -- the search
 
@@ -525,7 +525,7 @@ class _Search:
         for k in self.pairs:
             base = self.exact.bases[k]
             rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
-            constant = sp.Add(*[number(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
+            constant = sp.Add(*[_exact(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
                                 if not set(term) & self.unknown_leaves])
             right.append({**angles, **loose}[k] - constant)
         found = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))
@@ -552,6 +552,12 @@ class _Search:
 def _decimal(value: Any) -> Any:
     """A decimal number as a fraction of integers; 0.1 is 1/10. Anything else as it is."""
     return sp.Rational(str(value)) if isinstance(value, (float, sp.Float)) and math.isfinite(value) else value
+
+
+def _exact(value: Any) -> sp.Rational:
+    """A number of a polynomial as a fraction: SymPy's floats would be rounded in every product."""
+    value = Fraction(value)
+    return sp.Rational(value.numerator, value.denominator)
 
 
 def _proved(e: sp.Expr) -> bool:

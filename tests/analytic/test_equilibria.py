@@ -106,6 +106,23 @@ def test_coordinates_that_follow_free_ones():
             assert np.abs(left_over(eq, point, rng)).max() < 1e-12
 
 
+def test_puma_at_rest_without_torques():
+    """Thirty-two postures, at numbers with so many digits that products of floats would not cancel; accelerations there are zero."""
+    eq = sd.systems.get("puma560").embedding()
+    found = eq.equilibria(values=eq.symbols.defaults)
+    assert len(found) == 32 and all(point.proved and {q.name for q in point.free} == {"q1", "q6"} for point in found)
+    module, rng = eq.compile(backend="numpy"), np.random.default_rng(1)
+    for point in found:
+        q = [float(point.values[q]) if q in point.values else rng.uniform(-3, 3) for q in eq.symbols.coordinates]
+        assert np.abs(module.rhs(0, [*q, *np.zeros(6)])).max() < 1e-12
+
+
+def test_functions_of_the_position_are_named():
+    eq = sd.systems.get("floating_crane").embedding()
+    with pytest.raises(SymdynError, match=r"but the conditions hold V\(.*\), which is no polynomial; use module.equilibria"):
+        eq.equilibria(values=eq.symbols.defaults)
+
+
 def test_what_is_no_equilibrium_is_an_error(monkeypatch):
     """Each point is put into the equations, at numbers for parameters where exact algebra cannot decide."""
     import symdyn.analytic.equilibria as place
