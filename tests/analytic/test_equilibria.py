@@ -107,7 +107,7 @@ def test_coordinates_that_follow_free_ones():
 
 
 def test_puma_at_rest_without_torques():
-    """Thirty-two postures, at numbers with so many digits that products of floats would not cancel; accelerations there are zero."""
+    """Thirty-two postures, at numbers of so many digits that products of floats do not cancel; accelerations there are zero."""
     eq = sd.systems.get("puma560").embedding()
     found = eq.equilibria(values=eq.symbols.defaults)
     assert len(found) == 32 and all(point.proved and {q.name for q in point.free} == {"q1", "q6"} for point in found)
@@ -119,7 +119,7 @@ def test_puma_at_rest_without_torques():
 
 def test_functions_of_the_position_are_named():
     eq = sd.systems.get("floating_crane").embedding()
-    with pytest.raises(SymdynError, match=r"but the conditions hold V\(.*\), which is no polynomial; use module.equilibria"):
+    with pytest.raises(SymdynError, match=r"but the conditions hold S_x\(.*\), which is no polynomial; use module"):
         eq.equilibria(values=eq.symbols.defaults)
 
 
