@@ -65,8 +65,9 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     samples     Samples, or a mapping from names or symbols of parameters, initial coordinates, speeds, extra states and inputs
                 to arrays of one length: the k-th values belong to member k
     t           as for `simulate`
-    outcomes    a list of texts "end q1", or start, min, max, mean, rms (both over time), trace (all times) of a coordinate,
-                speed, input, output or "energy", and "q1 at 2.5"; "grad end q1" and the like are exact derivatives of these,
+    outcomes    a list of texts "end q1", or start, min, max, mean, rms, trace (all times) of a coordinate, speed, input, output
+                or "energy", and "q1 at 2.5"; all are of the values at the output times: least and greatest ones of these, mean
+                and rms over time by the trapezoidal rule; "grad end q1" and the like are exact derivatives of these,
                 of states and outputs, (n,) numbers, by `sensitivities`; or a mapping from labels to these or to functions of a
                 Solution, which return a number or an array. Default: the end of all coordinates and speeds
     q, u, z, params, inputs   what is the same for all members, as for `simulate`; inputs are numbers
