@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,8 +14,12 @@ from symdyn.runtime.raised import called
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
+    import sympy as sp
+
     from symdyn.given import Scalar
     from symdyn.runtime.module import Module
+    from symdyn.tape.node import Node
+    from symdyn.tape.tape import Tape
 
     LossFunction = Callable[[float, np.ndarray, np.ndarray], tuple[float, np.ndarray] | tuple[float, np.ndarray, np.ndarray]]
 
@@ -50,11 +55,24 @@ class Costs(NamedTuple):
     by: np.ndarray | None
 
 
-Cost = Callable[[np.ndarray, np.ndarray, np.ndarray], Costs]
+@dataclass(frozen=True)
+class Cost:
+    """A function of times (n,), states (n, n_x) and inputs (n, n_in) that gives a cost and its derivatives; smooth: whether it is
+    known to have no kink."""
+
+    of: Callable[[np.ndarray, np.ndarray, np.ndarray], Costs]
+    smooth: bool
+
+    def __call__(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
+        return self.of(t, x, inputs)
+
+
+# Operations of which expressions have no kink wherever they are defined.
+_SMOOTH = frozenset({"leaf", "pi", "neg", "add", "sub", "mul", "div", "sin", "cos", "tan", "exp", "sinh", "cosh", "tanh", "atan"})
 
 
 def cost_of(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndarray) -> Cost:
-    """A function of times (n,), states (n, n_x) and inputs (n, n_in) that gives a cost and its derivatives.
+    """The function of what was given, an expression or a function of the user.
 
     by   parameters and inputs
     Raises ArgumentError for what is neither an expression of the module's names nor a function.
@@ -87,53 +105,72 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
         return _finite(module, what, t, Costs(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]),
                                               np.array([r[2][places] for r in rows]).reshape(len(rows), len(by))))
 
-    return all_rows
+    return Cost(all_rows, smooth=False)
 
 
 def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndarray) -> Cost:
     import sympy as sp
 
-    from symdyn.tape import node as kinds
-    from symdyn.tape.differentiate import reverse
     from symdyn.tape.floats import evaluate_rows
-    from symdyn.tape.node import is_zero
-    from symdyn.tape.recorder import Recorder
-    from symdyn.tape.sympy_bridge import record_expression
-    from symdyn.tape.tape import Tape
 
-    metadata, recorder = module.metadata, Recorder()
-    names = {"t": kinds.TIME, **dict.fromkeys(metadata.x, kinds.STATE), **dict.fromkeys(metadata.inputs, kinds.INPUT),
-             **dict.fromkeys(metadata.parameters, kinds.PARAMETER)}
-    leaves = {name: recorder.leaf(name, kind) for name, kind in names.items()}
+    metadata = module.metadata
     try:
         expression = sp.sympify(given, strict=True)
     except (sp.SympifyError, TypeError):
         raise ArgumentError(f"{module.name}: {what} of the loss is {shown(given)}; pass an expression of coordinates, speeds, "
                             "inputs, parameters and sd.t, or a function of (t, x, p) that returns its value and its "
                             "derivatives") from None
-    unknown = sorted(str(s) for s in expression.free_symbols if str(s) not in leaves)
-    if unknown:
-        raise ArgumentError(f"{module.name}: {what} of the loss has {', '.join(unknown)}, which is no state, input or parameter "
-                            f"here; there are {', '.join(names)}")
-    try:
-        value = record_expression(recorder, expression, {s: leaves[str(s)] for s in expression.free_symbols})
-    except UnsupportedExpression as error:
-        raise ArgumentError(f"{module.name}: {what} of the loss: {error}; write it in coordinates and speeds, or pass a function "
-                            "of (t, x, p) that returns its value and its derivatives") from None
-    slopes = reverse(recorder, value, [leaves[name] for name in (*metadata.x, *by)])
-    if all(map(is_zero, slopes[metadata.sizes.x:])):
-        slopes = slopes[:metadata.sizes.x]
-    tape = Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
+    tape = _differentiated(f"{module.name}: {what} of the loss", expression, metadata.x, metadata.inputs, metadata.parameters,
+                           tuple(by))
     fixed = dict(zip(metadata.parameters, p.tolist(), strict=True))
 
     def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
         at = {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed}
         found = evaluate_rows(tape, at, len(t))
         values, rows = found["values"].reshape(len(t)), found["slopes"].reshape(len(t), -1)
-        others = rows[:, x.shape[1]:] if len(slopes) > x.shape[1] else None
+        others = rows[:, x.shape[1]:] if rows.shape[1] > x.shape[1] else None
         return _finite(module, what, t, Costs(values, rows[:, :x.shape[1]], others))
 
-    return all_rows
+    return Cost(all_rows, smooth=all(map(_is_smooth, tape.steps)))
+
+
+@lru_cache(maxsize=64)  # an optimizer asks for the gradient of one loss many times
+def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], inputs: Sequence[str], parameters: Sequence[str],
+                    by: Sequence[str]) -> Tape:
+    """An expression, and its derivatives by the states and, unless these are all zero, by others; what: how messages call it."""
+    from symdyn.tape import node as kinds
+    from symdyn.tape.differentiate import reverse
+    from symdyn.tape.node import is_zero
+    from symdyn.tape.recorder import Recorder
+    from symdyn.tape.sympy_bridge import record_expression
+    from symdyn.tape.tape import Tape
+
+    recorder = Recorder()
+    names = {"t": kinds.TIME, **dict.fromkeys(states, kinds.STATE), **dict.fromkeys(inputs, kinds.INPUT),
+             **dict.fromkeys(parameters, kinds.PARAMETER)}
+    leaves = {name: recorder.leaf(name, kind) for name, kind in names.items()}
+    unknown = sorted(str(s) for s in expression.free_symbols if str(s) not in leaves)
+    if unknown:
+        raise ArgumentError(f"{what} has {', '.join(unknown)}, which is no state, input or parameter here; there are "
+                            f"{', '.join(names)}")
+    try:
+        value = record_expression(recorder, expression, {s: leaves[str(s)] for s in expression.free_symbols})
+    except UnsupportedExpression as error:
+        raise ArgumentError(f"{what}: {error}; write it in coordinates and speeds, or pass a function of (t, x, p) that returns "
+                            "its value and its derivatives") from None
+    slopes = reverse(recorder, value, [leaves[name] for name in (*states, *by)])
+    if all(map(is_zero, slopes[len(states):])):
+        slopes = slopes[:len(states)]
+    return Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
+
+
+def _is_smooth(node: Node) -> bool:
+    """Whether an operation has no kink; whole powers have none."""
+    from symdyn.tape.node import Node
+
+    if node.op == "pow":
+        return not isinstance(node.args[1], Node) and node.args[1] == int(node.args[1])
+    return node.op in _SMOOTH
 
 
 def _finite(module: Module, what: str, t: np.ndarray, costs: Costs) -> Costs:

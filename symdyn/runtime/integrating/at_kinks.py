@@ -53,7 +53,7 @@ def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, inte
         if module.metadata.not_smooth and has_kink(
                 lambda states: module.evaluate("rhs", time, states, request.p, inputs(states)), at, k):  # noqa: B023
             found.append(f"{where} the equations have a kink: {REMEDY}")
-        elif integral is not None and has_kink(
+        elif integral is not None and not integral.smooth and has_kink(
                 lambda states: integral(np.full(len(states), time), states, inputs(states)).values, at, k):  # noqa: B023
             found.append(f"{where} the integral of the loss has a kink: {REMEDY}")
     return found
@@ -61,6 +61,8 @@ def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, inte
 
 def ending(module: Module, request: Request, t: float, x: np.ndarray, end: Cost) -> list[str]:
     """What to warn of where the cost of the end has a kink at the end."""
+    if end.smooth:
+        return []
     values = lambda states: end(np.full(len(states), t), states, request.inputs.rows(np.full(len(states), t), states)).values
     return [f"{module.name}: the motion ends with {name} = {x[k]:.6g}, where the end of the loss has a kink: {REMEDY}"
             for k, name in enumerate(module.metadata.x) if has_kink(values, x, k)]
