@@ -321,6 +321,8 @@ def test_what_does_not_fit() -> None:
         pendulum().simulate(**ask, method="RK45")
     with pytest.raises(ArgumentError, match="only compiled methods"):
         sd.systems.pendulum().embedding().compile(backend="numpy").simulate(**ask)
+    with pytest.raises(ArgumentError, match="sensitivities were asked for with method 'ggl' on the backend c; only compiled"):
+        sd.systems.four_bar().augmented().compile().simulate((0, 0.1), method="ggl", sensitivities=["g"])
     with pytest.raises(ArgumentError, match="together with work=True; make two runs"):
         pendulum().simulate(**ask, work=True)
     with pytest.raises(ArgumentError, match="with Baumgarte's stabilization; they are those of the projected motion"):

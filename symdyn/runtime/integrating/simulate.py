@@ -116,6 +116,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if method == "ggl":
             from symdyn.runtime.integrating.dae_run import check_ggl
 
+            if asked.columns:
+                asked.check(module, request, method, work)
             check_ggl(module, start, p, span[0], stabilization, work)
         else:
             request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))
