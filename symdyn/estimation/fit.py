@@ -20,7 +20,10 @@ from scipy.optimize import least_squares
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning, SymdynError
 from symdyn.estimation.experiment import Experiment, Measured, taken
 from symdyn.estimation.result import Fit, Unknown
+from symdyn.estimation.starts import Start, moves
 from symdyn.real_numbers import number_of
+from symdyn.runtime.inputs.inputs import inputs_at
+from symdyn.runtime.integrating.simulate import start_of
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -43,7 +46,8 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
     data         an sd.Experiment, or several
     parameters   that are the same in all experiments, by name or symbol
     initial      coordinates, speeds and extra states whose initial values are unknown, each its own in every experiment; their
-                 guess is the experiment's start
+                 guess is the experiment's start. With constraints, the coordinates and speeds that are neither fitted nor among
+                 the first that the constraints leave free follow from them, for every value that is tried
     bounds       name -> (least, most) of a parameter, or of an initial value, as "q1(0)"; masses of bodies are positive anyway
     priors       name -> (mean, standard deviation): what is known of it apart from the data
     noise        standard deviation of what was measured, for all or by name; None: the same for all, estimated from what the fit
@@ -81,6 +85,7 @@ class _Problem:
 
     scale   of the unknowns; least, most: their bounds
     noise   standard deviation by what was measured; known: whether it was given
+    starts  of the experiments on the constraints; None where a start is as it is given, with unknown values put in
     """
 
     module: Module
@@ -94,6 +99,7 @@ class _Problem:
     known: bool
     rtol: float
     method: str
+    starts: list[Start | None]
     failure: str = ""
     runs: int = 0
 
@@ -170,9 +176,19 @@ class _Problem:
         mine = [(unknown, float(v)) for unknown, v in zip(self.unknowns, values, strict=True) if unknown.experiment in (None, k)]
         params = {**{str(name_of(key)): value for key, value in experiment.params.items()},
                   **{u.name: v for u, v in mine if u.experiment is None}}
-        start = self._start(k, {u.state: v for u, v in mine if u.experiment is not None})
-        return self.module.simulate(self.experiments[k].t, **start, params=params, inputs=experiment.inputs, rtol=self.rtol,
-                                    method=self.method, sensitivities=[u.asked for u, _ in mine])
+        initial = {u.state: v for u, v in mine if u.experiment is not None}
+        start = self.starts[k]
+        asked: Any = [u.asked for u, _ in mine]
+        if start is None:
+            given = self._start(k, initial)
+        else:
+            p = self.module.parameters(params)
+            x = start.at(initial, p)
+            sizes = self.module.metadata.sizes
+            given = dict(zip(("q", "u", "z"), np.split(x, [sizes.q, sizes.q + sizes.u]), strict=True))
+            asked = {u.asked: start.derivative(x, p, u.state) for u, _ in mine}
+        return self.module.simulate(self.experiments[k].t, **given, params=params, inputs=experiment.inputs, rtol=self.rtol,
+                                    method=self.method, sensitivities=asked)
 
     def _start(self, k: int, unknown: Mapping[str, float]) -> dict[str, Any]:
         """q, u and z of an experiment, with the unknown initial values put in."""
@@ -230,7 +246,9 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
         raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
     scale = np.array([abs(u.guess) if u.guess else 1.0 for u in unknowns])
     held = [(i, *known[u.name]) for i, u in enumerate(unknowns) if u.name in known]
-    problem = _Problem(module, experiments, unknowns, scale, least, most, held, deviations, noise is not None, rtol, method)
+    values = {u.name: u.guess for u in unknowns if u.experiment is None}
+    problem = _Problem(module, experiments, unknowns, scale, least, most, held, deviations, noise is not None, rtol, method,
+                       [_on_constraints(module, e, values, states) for e in experiments])
     if problem.n < len(unknowns):
         raise ArgumentError(f"{module.name}: {len(unknowns)} unknowns are fitted to {problem.n} values; measure more, or fit "
                             "less")
@@ -310,3 +328,14 @@ def _guess(module: Module, experiment: Experiment, state: str) -> float:
             guess = module.metadata.initial.get(state, 0.0) if given is None else given
             return number_of(guess, module.name, f"{state} at the start of an experiment must be a number")
     raise AssertionError(state)
+
+
+def _on_constraints(module: Module, measured: Measured, guesses: Mapping[str, float], states: Sequence[str]) -> Start | None:
+    """The start of an experiment as a function of what is fitted; None where no constraint ties its entries to that."""
+    experiment, metadata = measured.experiment, module.metadata
+    p = module.parameters({**{str(name_of(key)): value for key, value in experiment.params.items()}, **guesses})
+    x, t = start_of(module, experiment.q, experiment.u, experiment.z), float(measured.t[0])
+    if metadata.motions:
+        module = module.following(inputs_at(experiment.inputs, t, metadata.inputs, metadata.initial, module.name,
+                                            metadata.motions))
+    return Start(module, t, x, p, states) if moves(module, t, x, p, list(guesses), states) else None

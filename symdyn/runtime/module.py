@@ -655,7 +655,7 @@ class Module:
                  steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
                  progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
                  events: bool | str | Sequence[str] = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                 extend: str = "error", sensitivities: Names | None = None, sensitivity_control: bool = True,
+                 extend: str = "error", sensitivities: Names | Named[Row] | None = None, sensitivity_control: bool = True,
                  step: float = 0.0) -> Solution:
         """Integrate the motion.
 
@@ -691,7 +691,9 @@ class Module:
         event_spacing   the longest time between samples of the events, s, for pulses that last as long; 0: they are sampled as
                     they vary, with a warning where zeros between samples cannot be ruled out
         sensitivities   what the motion is differentiated by, exactly: parameters and constant inputs, by name or symbol, and
-                    initial values, as "q1(0)"; see `Solution.sensitivity` and docs/derivatives.md. Compiled methods only
+                    initial values, as "q1(0)"; or a mapping from these to derivatives of the start by them, (n_x,), for a
+                    start that changes with them, such as on constraints (those of a list are: 1 for the state of "q1(0)",
+                    else 0); see `Solution.sensitivity` and docs/derivatives.md. Compiled methods only
         sensitivity_control   whether the steps keep the errors of the sensitivities within the tolerances, too; False: those of
                     the state alone
         step        length of the steps of method="moreau", s; 0: it is halved until the coordinates agree within the tolerances
@@ -738,7 +740,7 @@ class Module:
 
         return solver_of(Setting.of(self, method, params, inputs, events, stabilization, interpolation, extend))
 
-    def gradient(self, loss: Loss, by: Names, t: Row | None = None, q: Values | None = None, u: Values | None = None,
+    def gradient(self, loss: Loss, by: Names | Named[Row], t: Row | None = None, q: Values | None = None, u: Values | None = None,
                  params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None, rtol: float = 1e-8,
                  atol: float | Row | None = None, method: str | None = None, max_step: float = 0.0, first_step: float = 0.0,
                  stabilization: str | None = None, events: bool | str | Sequence[str] = True, interpolation: str = "linear",
@@ -746,7 +748,8 @@ class Module:
         """Derivatives of a loss of a motion by many numbers at once, backwards over the steps that were taken.
 
         loss     sd.Loss: the integral of an expression or function over time, and one at the end
-        by       parameters, constant inputs, by name or symbol, and initial values, as "q1(0)"
+        by       parameters, constant inputs, by name or symbol, and initial values, as "q1(0)"; or a mapping from these to
+                 derivatives of the start by them, (n_x,), as for `simulate`
         method   "dop853" (default) or "bs54"; all others as for `simulate`
 
         They are the derivatives of what these steps compute, exact to rounding at given lengths of the steps; with constraints
@@ -774,7 +777,8 @@ class Module:
                        max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
                        max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
-                       interpolation: str = "linear", extend: str = "error", sensitivities: Names | None = None,
+                       interpolation: str = "linear", extend: str = "error",
+                       sensitivities: Names | Named[Row] | None = None,
                        sensitivity_control: bool = True) -> BatchSolution:
         """Integrate many motions of one mechanism, each with its own steps.
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import real_of
 from symdyn.runtime.integrating.at_kinks import staying
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -59,9 +60,12 @@ class Asked:
             raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
         values = {**dict(zip(metadata.inputs, inputs.constant, strict=True)), **dict(zip(metadata.parameters, p, strict=True))}
         columns, starts, sizes = [], [], []
+        along = _given_starts(module, given)
         for name, state in by.items():
             start = np.zeros(n_x)
-            if state:
+            if name in along:
+                start = along[name]
+            elif state:
                 start[metadata.x.index(state)] = 1.0
             columns.append("" if state else name)
             sizes.append(1.0 if state else abs(float(values[name])) or 1.0)
@@ -169,6 +173,21 @@ def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
             found[name] = ""
         else:
             faults.append(_unknown(module, name))
+    return found
+
+
+def _given_starts(module: Module, given: Any) -> dict[str, np.ndarray]:
+    """Derivatives of the start by name, (n_x,) each, of a mapping; of a list none."""
+    if not isinstance(given, Mapping):
+        return {}
+    n_x, found = module.metadata.sizes.x, {}
+    for key, value in given.items():
+        what = f"the derivative of the start by {name_of(key)}"
+        row = real_of(value, module.name, f"{what} must be numbers")
+        if row.shape != (n_x,) or not np.isfinite(row).all():
+            raise ArgumentError(f"{module.name}: sensitivities give {shown(value)} as {what}; pass {n_x} finite "
+                                f"numbers, those of {', '.join(module.metadata.x)}")
+        found[str(name_of(key))] = np.array(row, dtype=float)
     return found
 
 
