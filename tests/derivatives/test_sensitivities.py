@@ -341,3 +341,20 @@ def test_what_has_no_effect() -> None:
     with pytest.warns(SimulationWarning, match=r"nothing in this motion depends on m: the sensitivities are zero"):
         run = pendulum().simulate((0, 1), [1.0], sensitivities=["m", "l"])
     assert not run.sensitivity["m"].any() and run.sensitivity["l"].any()
+
+
+def test_steps_next_to_a_singular_configuration_are_warned_of() -> None:
+    """A slider-crank of equal bars at its dead point: where steps land next to it the sensitivities lose digits."""
+    module = sd.systems.get("slider_crank").augmented().compile()
+    starts = [(a, w) for a in np.linspace(0.8, 1.2, 8) for w in (2.1, 3.0, 3.9)]
+    off = {True: [], False: []}
+    for a, w in starts:
+        asked = {"q": [a, -2 * a], "u": [w, -2 * w], "sensitivities": {"phi_dot(0)": [0, 0, -0.5, 1]}}
+        reference = module.simulate([0, 0.5], method="bs54", rtol=1e-11, **asked).sensitivity["phi_dot(0)"][-1]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = module.simulate([0, 0.5], method="radau", rtol=1e-10, **asked).sensitivity["phi_dot(0)"][-1]
+        off[bool(caught)].append(float(np.abs(found - reference).max() / np.abs(reference).max()))
+        assert all("next to a singular configuration, at t = " in str(one.message) for one in caught)
+    assert max(off[False]) < 1e-9  # ten tolerances
+    assert len(off[True]) > 1 and max(off[True]) > 1e-8

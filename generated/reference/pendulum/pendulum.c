@@ -484,6 +484,7 @@ typedef struct {
     int of_speeds;
     double reset_gap;                    // by how much a reset that the constraints do not allow is off
     double largest_dq, largest_du;       // largest changes by projections after a step, norms
+    double largest_moved, t_moved;       // the largest in tolerances, and when
     long n_corrected, n_corrections;     // steps whose end was moved, calls of the corrections
     long n_jacobians, n_factorizations;  // of implicit methods
     long n_divided, n_rough;             // gauss: steps that were divided; those done again by halves that differ
@@ -536,6 +537,7 @@ typedef struct {
     // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
     // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
     double dq, du, residual, largest_dq, largest_du;
+    double moved, largest_moved, t_moved;  // how far the latest end was moved, in tolerances; of all the most, and when
     int worst, of_speeds;
     long n_corrected, n_corrections, n_jacobians, n_factorizations;
     double before[SYMDYN_NX];  // what was projected last
@@ -920,6 +922,8 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
         .of_speeds = run->of_speeds,
         .largest_dq = run->largest_dq,
         .largest_du = run->largest_du,
+        .largest_moved = run->largest_moved,
+        .t_moved = run->t_moved,
         .n_corrected = run->n_corrected,
         .n_corrections = run->n_corrections,
         .n_jacobians = run->n_jacobians,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import time as clock
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from symdyn.runtime.batches.validity import outside
 from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
+from symdyn.runtime.integrating.compiled import FAR, moved_far
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
 from symdyn.runtime.integrating.sensitivities import names_of
@@ -193,6 +194,8 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
         why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
                "their steps may have become too short")
         note = f"{late.sum()} of {n} motions one by one: they took more than {PATIENCE * PIECE} steps, and {why}"
+    moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
+    _warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
     if projects(module):  # what keeps a state from the constraints, a run of its own finds out
         late |= ~success
         late[list(wrong)] = False
@@ -308,7 +311,12 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
             used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
         if not done.success:
             messages[k] = done.message
+    _warn(doubts, n)
+    return solution()
+
+
+def _warn(doubts: Sequence[str], n: int) -> None:
+    """Warns of some of n motions, if there are any."""
     if doubts:
         more = f"; and {len(doubts) - LISTED} more" if len(doubts) > LISTED else ""
-        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=4)
-    return solution()
+        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=5)

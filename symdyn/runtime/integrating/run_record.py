@@ -32,6 +32,8 @@ class RunReport(ctypes.Structure):
     reset_gap: float
     largest_dq: float
     largest_du: float
+    largest_moved: float
+    t_moved: float
     n_corrected: int
     n_corrections: int
     n_jacobians: int

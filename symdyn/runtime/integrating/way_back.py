@@ -9,6 +9,7 @@ grows with the square root of their number (Griewank and Walther, Evaluating Der
 from __future__ import annotations
 
 import ctypes
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -17,9 +18,9 @@ import numpy as np
 
 from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import RightSide
-from symdyn.errors import EvaluationError
+from symdyn.errors import EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import Inputs
-from symdyn.runtime.integrating.compiled import Run, stopped_because
+from symdyn.runtime.integrating.compiled import Run, moved_far, stopped_because
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.runtime.integrating.run_record import STATUS
 from symdyn.runtime.losses import Cost
@@ -157,6 +158,9 @@ class Way:
         if status != STATUS.DONE:
             raise EvaluationError(stopped_because(self.module, run, status, report))
         self.end = report.of.t, report.x
+        doubt = moved_far(self.module.name, report.of.largest_moved, report.of.t_moved)
+        if doubt:
+            warnings.warn(doubt, SimulationWarning, stacklevel=6)
         return steps
 
     def _record(self, steps: _Steps) -> int:

@@ -135,11 +135,13 @@ SYMDYN_LINKED int symdyn_correct(symdyn_run *run, double t, double *x) {
 // Project the end x of the step under way from run->x; moved: whether by more than a thousandth of the tolerance. Returns 0 or a
 // failure.
 static int symdyn_move_end(symdyn_run *run, double t, double *x, int *moved) {
-    double way = 0.0, size = 0.0, far[2] = {0.0, 0.0};
+    double way = 0.0, size = 0.0, far[2] = {0.0, 0.0}, change[SYMDYN_NX];
     int failure;
     *moved = run->end_moved = 0;
     for (int i = 0; i < SYMDYN_NX; i++) run->x_end[i] = x[i];
     if (run->problem.project && (failure = symdyn_correct(run, t, x))) return failure;
+    for (int i = 0; i < SYMDYN_NX; i++) change[i] = x[i] - run->x_end[i];
+    run->moved = sqrt(symdyn_square(run, change, x));
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++) far[i >= SYMDYN_NQ] = fmax(far[i >= SYMDYN_NQ], fabs(x[i]));
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++)
         *moved |=
@@ -166,6 +168,10 @@ static void symdyn_note_projection(symdyn_run *run, int moved) {
     run->n_corrected += moved;
     run->largest_dq = fmax(run->largest_dq, run->dq);
     run->largest_du = fmax(run->largest_du, run->du);
+    if (run->moved > run->largest_moved) {
+        run->largest_moved = run->moved;
+        run->t_moved = run->t_new;
+    }
 }
 
 // Project the end x of the step under way from run->x; xd becomes the derivative there. Returns 0 or a failure.

@@ -14,6 +14,7 @@ typedef struct {
     int of_speeds;
     double reset_gap;                    // by how much a reset that the constraints do not allow is off
     double largest_dq, largest_du;       // largest changes by projections after a step, norms
+    double largest_moved, t_moved;       // the largest in tolerances, and when
     long n_corrected, n_corrections;     // steps whose end was moved, calls of the corrections
     long n_jacobians, n_factorizations;  // of implicit methods
     long n_divided, n_rough;             // gauss: steps that were divided; those done again by halves that differ

@@ -29,6 +29,7 @@ typedef struct {
     // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
     // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
     double dq, du, residual, largest_dq, largest_du;
+    double moved, largest_moved, t_moved;  // how far the latest end was moved, in tolerances; of all the most, and when
     int worst, of_speeds;
     long n_corrected, n_corrections, n_jacobians, n_factorizations;
     double before[SYMDYN_NX];  // what was projected last

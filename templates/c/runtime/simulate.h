@@ -95,6 +95,8 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
         .of_speeds = run->of_speeds,
         .largest_dq = run->largest_dq,
         .largest_du = run->largest_du,
+        .largest_moved = run->largest_moved,
+        .t_moved = run->t_moved,
         .n_corrected = run->n_corrected,
         .n_corrections = run->n_corrections,
         .n_jacobians = run->n_jacobians,
