@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 PIECE = 20_000
 STEPS_AT_ONCE = 4096
 # A step whose error was tolerated and that is moved by more tolerances has lost digits. Of 720 runs across singular
-# configurations those whose sensitivities lost a hundred tolerances or more were moved by 4,000 to 6e8; regular ones by 12 at most.
+# configurations those whose sensitivities lost a hundred tolerances or more were moved by 4,000 to 6e8; regular runs by 12 at
+# most.
 FAR = 1000.0
 # Most events that wait to be taken, besides three of each kind; see `noted` in the generated source.
 _EVENTS_WAITING = 64
@@ -247,10 +248,11 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
         message = ended(module, next(stopping), report.of.t)
     if over or not success:
         t, x = with_last(t, x, report.of.t, report.x)
-    doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing),
-              *([_doubt(module, request, method, report.of),
-                 moved_far(module.name, report.of.largest_moved, report.of.t_moved, bool(request.columns))] if status >= 0 else [])]
     of = report.of
+    doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing)]
+    if status >= 0:
+        doubts += [_doubt(module, request, method, of),
+                   moved_far(module.name, of.largest_moved, of.t_moved, bool(request.columns))]
     return Outcome(t, x, success, message, interrupted, of.n_steps, of.n_rejected, of.n_evaluations, run.seconds,
                    Corrections(of.largest_dq, of.largest_du, of.n_corrected, of.n_corrections), run.happened, of.n_jacobians,
                    of.n_factorizations, tuple(filter(None, doubts)),
