@@ -10,7 +10,7 @@ class complex delete explicit export false friend imaginary mutable namespace ne
 template this throw true try typename using virtual NULL main""".split()
 _MATH = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt cbrt pow fabs fmin fmax floor
 ceil erf erfc gamma lgamma tgamma j0 j1 jn y0 y1 yn isnan isinf""".split()
-_OTHERS = """abs max min sign pi where sum range len print math numpy np t q u z x ud xd p c inputs out n status logical_and
+_OTHERS = """abs max min sign pi where sum range len print math numpy np t q u z x ud xd p c w inputs out n status logical_and
 logical_or logical_not symdyn_sign let var function null undefined typeof super arguments eval debugger instanceof angles
 sines cosines""".split()
 # Variables get none of these names.

@@ -66,6 +66,23 @@ def test_parts_give_the_same(name: str, options: dict, longest: int, divided: An
     assert np.abs(parts - whole).max() <= 1e-12 * np.abs(whole).max()
 
 
+@needs_c
+def test_parameters_may_be_called_as_the_work_array_of_parts(divided: Any) -> None:
+    divided(20)
+    g, w = sd.parameters("g w")
+    system = sd.System("chain", gravity=[0, 0, -g])
+    body = system.ground
+    for k, q in enumerate(sd.coordinates("q_0:6")):
+        link = system.add_body(f"link{k}", mass=1 + w, inertia=[0.1, 0.2 * w, 0.3], com=[0.1 * w, 0, 0.3])
+        system.add_joint(sd.Revolute(f"joint{k}", body, link, q, axis=np.eye(3)[k % 3].tolist(), parent_point=[0, 0.2, w]))
+        body = link
+    system.defaults = {g: 9.81, w: 0.5}
+    equations = system.embedding()
+    x = np.full(12, 0.1)
+    assert len(emit(equations, "c", ("rhs",), standalone=False).program.functions[0].parts) > 1
+    np.testing.assert_allclose(equations.compile(backend="c").rhs(0, x), equations.compile(backend="numpy").rhs(0, x), rtol=1e-10)
+
+
 def test_stretches_hand_on_what_is_needed_and_no_more() -> None:
     """Run the stretches by themselves: every value is there when it is read, and nothing overwrites it before."""
     tape = sd.systems.get("spatial_chain", n=5).recursive().tape("rhs")
