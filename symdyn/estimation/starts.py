@@ -15,7 +15,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.consistent import closest
-from symdyn.runtime.constraints import as_velocities, length
+from symdyn.runtime.constraints import as_velocities, derivatives, length
 from symdyn.turning import is_angle
 
 if TYPE_CHECKING:
@@ -40,14 +40,7 @@ def moves(module: Module, t: float, x: np.ndarray, p: np.ndarray, parameters: Se
     if not metadata.constraints or not parameters:
         return False
     places = [metadata.parameters.index(name) for name in parameters]
-    return any(_derivatives(module, of, t, x, p)[1][:, places].any() for of in ("C", "C_dot"))
-
-
-def _derivatives(module: Module, of: str, t: float, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of C or C_dot by the state and by the parameters: (n_c, n_x), (n_c, n_p)."""
-    found = module.jacobian(t, x, p, wrt=["x", "params"], of=of)
-    assert found.x is not None and found.params is not None
-    return found.x, found.params
+    return any(derivatives(module, of, t, x, p)[1][:, places].any() for of in ("C", "C_dot"))
 
 
 class Start:
@@ -162,7 +155,7 @@ class Start:
         C, C_q, C_p = np.zeros(0), np.zeros((0, self._n_q)), np.zeros((0, len(p)))
         if self._n_c:
             scale = self._module.evaluate("C_scale", self._t, x, p)[self._holonomic]
-            by_x, by_p = _derivatives(self._module, "C", self._t, x, p)
+            by_x, by_p = derivatives(self._module, "C", self._t, x, p)
             C = self._module.evaluate("C", self._t, x, p)[self._holonomic] * scale
             C_q, C_p = by_x[self._holonomic, :self._n_q] * scale[:, None], by_p[self._holonomic] * scale[:, None]
         for group in self._units:
@@ -177,7 +170,7 @@ class Start:
         if not self._n_c:
             return np.zeros(0), np.zeros((0, self._n_u)), np.zeros((0, len(x))), np.zeros((0, len(p)))
         scale = self._module.evaluate("C_scale", self._t, x, p)
-        by_x, by_p = _derivatives(self._module, "C_dot", self._t, x, p)
+        by_x, by_p = derivatives(self._module, "C_dot", self._t, x, p)
         rows = by_x * scale[:, None]
         return (self._module.evaluate("C_dot", self._t, x, p) * scale, rows[:, self._n_q:self._n_q + self._n_u], rows,
                 by_p * scale[:, None])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.tape.kernels import RANK
-from symdyn.turning import turns
+from symdyn.turning import is_angle, turns
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -82,6 +83,34 @@ def counted(values: np.ndarray, tolerance: float = RANK) -> np.ndarray:
     """Which singular values (..., k), the largest first, are not zero; a Jacobian that vanishes as a whole has none."""
     result: np.ndarray = values > tolerance * np.maximum(values[..., :1], 1)
     return result
+
+
+def derivatives(module: Module, of: str, t: float, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of C or C_dot, as `of` says, by the state and by the parameters: (n_c, n_x), (n_c, n_p)."""
+    found = module.jacobian(t, x, p, wrt=["x", "params"], of=of)
+    assert found.x is not None and found.params is not None
+    return found.x, found.params
+
+
+def holding(module: Module, t: float, x: np.ndarray, p: np.ndarray, parameters: Sequence[str]) -> list[str]:
+    """Parameters that dependent constraints do not allow to change: no dx fulfils C_q dq + C_p dp = 0 and the same of C_dot."""
+    n_c, n_q = len(names(module)), module.metadata.sizes.q
+    if not n_c or not parameters or int(rank(module, t, x, p)) == n_c:
+        return []
+    scale = module.evaluate("C_scale", t, x, p)[:, None]
+    (C_x, C_p), (C_dot_x, C_dot_p) = (derivatives(module, of, t, x, p) for of in ("C", "C_dot"))
+    holonomic = np.array(module.metadata.holonomic or [True] * n_c, dtype=bool)
+    rows = np.vstack([(scale * C_x)[holonomic], scale * C_dot_x])
+    units = np.concatenate([np.where([is_angle(module.metadata.units.get(q)) for q in module.metadata.q], length(module, p), 1.0),
+                            as_velocities(module, p), np.ones(len(x) - n_q - module.metadata.sizes.u)])
+    held = []
+    for name in parameters:
+        k = module.metadata.parameters.index(name)
+        by = np.concatenate([(scale * C_p)[holonomic, k], (scale * C_dot_p)[:, k]])
+        change = np.linalg.lstsq(rows / units, -by, rcond=RANK)[0]
+        if np.abs(rows / units @ change + by).max() > 1e-6 * np.abs(by).max():
+            held.append(name)
+    return held
 
 
 def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import real_of
+from symdyn.runtime.constraints import holding
 from symdyn.runtime.integrating.at_kinks import staying
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -108,6 +109,13 @@ class Asked:
                                 f"the user, whose derivatives are not known: {names}; pass sd.Smooth(function, gradient=...), a "
                                 "function of (t, x), write the law into the system's loads as expressions of coordinates and "
                                 "speeds, or make the inputs functions of the time alone")
+
+        changed = [name for name in self.columns if name in module.metadata.parameters]
+        held = ", ".join(holding(module, request.span[0], request.x0[:request.n_state], request.p, changed))
+        if held:
+            raise ArgumentError(f"{module.name}: sensitivities by {held} were asked for, but the constraints depend on each "
+                                f"other at the start, and to first order no position fulfils them when {held} changes alone: let "
+                                "other parameters follow from one, as expressions of it, or leave out what is redundant")
 
     def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
         """What to warn of: columns in which everything is zero all along, jumps that no event looks for, kinks that the motion
