@@ -24,6 +24,7 @@ from symdyn.estimation.starts import Start, moves
 from symdyn.real_numbers import number_of
 from symdyn.runtime.inputs.inputs import inputs_at
 from symdyn.runtime.integrating.simulate import start_of
+from symdyn.runtime.module import demand_module
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
     >>> round(found.values["l"], 6)
     1.3
     """
+    demand_module(module, "sd.fit")
     experiments = taken(module, data)
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise ArgumentError(f"{module.name}: max_steps is {shown(max_steps)}; pass a whole number from 1 on")

@@ -26,6 +26,7 @@ from symdyn.estimation.pseudo_inertia import Chart, is_consistent, nearest
 from symdyn.formulation.identification.regressor import PARAMETERS
 from symdyn.kinds import flag
 from symdyn.real_numbers import real_of
+from symdyn.runtime.module import demand_module
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
     >>> round(sd.identify(module, sd.MeasuredMotion(q[:, 0], q, tau, u=q, ud=q)).values["I_zz_bob"], 9)
     2.0
     """
+    demand_module(module, "sd.identify")
     consistent = flag(consistent, "identify: consistent")
     _check_mechanism(module)
     faults: list[str] = []
@@ -323,6 +325,9 @@ def _motion_noise(module: Module, given: Any, noise: Any, faults: list[str]) -> 
 
 
 def _friction(given: Any, faults: list[str]) -> tuple[str, ...]:
+    if not isinstance(given, (str, list, tuple)):
+        faults.append(f"friction is {shown(given)}; pass a list of {' and '.join(FRICTION)}")
+        return ()
     listed = [given] if isinstance(given, str) else list(given)
     faults += [f"friction has {shown(one)}; there are {' and '.join(FRICTION)}" for one in listed if one not in FRICTION]
     return tuple(kind for kind in FRICTION if kind in listed)
@@ -331,6 +336,9 @@ def _friction(given: Any, faults: list[str]) -> tuple[str, ...]:
 def _charts(module: Module, given: Any, faults: list[str]) -> list[Chart]:
     """Coordinates about the nominal inertia of every body."""
     bodies, start = module.metadata.bodies, np.zeros(module.metadata.sizes.x)
+    if given is not None and not isinstance(given, Mapping):
+        faults.append(f"nominal is {shown(given)}; pass a dictionary from bodies to ten numbers each")
+        return []
     own = {str(name_of(key)): value for key, value in (given or {}).items()}
     faults += [f"nominal has {shown(name)}, which is no body; there are {', '.join(bodies)}" for name in own
                if name not in bodies]

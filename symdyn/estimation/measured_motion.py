@@ -140,6 +140,8 @@ def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str])
     elif np.shape(given) == (len(initial),) and len(initial) != n:
         given = np.broadcast_to(real_of(given, module.name, f"inputs of {which} must be numbers"), (n, len(initial)))
     inputs = table(given, metadata.inputs, "inputs") if initial else np.zeros((n, 0))
+    if not isinstance(motion.params, Mapping):
+        faults.append(f"params of {which} are {shown(motion.params)}; pass a dictionary from names to numbers")
     if motion.z is None and metadata.z:
         faults.append(f"{which} has no z, and the system has the extra states {', '.join(metadata.z)}; give them")
     z = np.zeros((n, 0)) if motion.z is None else table(motion.z, metadata.z, "z")

@@ -21,6 +21,7 @@ from symdyn.optimal.problem import Faults, Problem, problem_of
 from symdyn.optimal.result import MeshRecord, Optimum
 from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
 from symdyn.real_numbers import NotReal, real
+from symdyn.runtime.module import demand_module
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     >>> round(found.duration, 6)  # bang-bang: 2 sqrt(1 m/(1 m/s^2))
     2.0
     """
+    demand_module(module, "sd.optimize")
     begun = clock.perf_counter()
     faults = Faults(module.name)
     chosen = _Chosen.of(transcription, intervals, degree, steps, hold, tolerance, max_refinements, method, accuracy,

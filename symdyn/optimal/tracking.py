@@ -20,6 +20,7 @@ from scipy.interpolate import PPoly
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.optimal.transcription import through
+from symdyn.real_numbers import number_of, real_of
 from symdyn.shown import name_of
 from symdyn.statics.regulator import demand_definite, weights_of
 
@@ -58,12 +59,20 @@ class Tracking:
     _K: PPoly = field(repr=False)
 
     def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Raises ArgumentError beyond the motion."""
+        """Raises ArgumentError beyond the motion, and for what is no time or no state."""
         motion = self.motion
-        if not self._begin <= t <= self._end:
-            t = float(motion.within(t))
-        found: np.ndarray = motion.inputs_over_time(t)
-        found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - motion.states_over_time(t))
+        try:
+            if not self._begin <= t <= self._end:
+                t = float(motion.within(t))
+            found: np.ndarray = motion.inputs_over_time(t)
+            found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - motion.states_over_time(t))
+        except (TypeError, ValueError):  # checked afterwards: it is called at every step of a motion
+            number_of(t, motion.module.name, "t of a regulator must be a number")
+            state = real_of(x, motion.module.name, "x of a regulator must be numbers")
+            if state.shape != (len(self.Q),):
+                raise ArgumentError(f"{motion.module.name}: x of a regulator has the shape {state.shape}; needed is "
+                                    f"{(len(self.Q),)}") from None
+            raise
         return found
 
     @cached_property

@@ -1260,6 +1260,13 @@ def _is_time(t: Any) -> bool:
     return (type(t) in _TIMES and t - t == 0) or (type(t) is int and -_WHOLE <= t <= _WHOLE)
 
 
+def demand_module(given: Any, who: str) -> None:
+    """Raises ArgumentError for what is no Module; who: what needs one."""
+    if not isinstance(given, Module):
+        advice = "compile it: system.compile()" if hasattr(given, "compile") else "pass what system.compile() returns"
+        raise ArgumentError(f"{who} needs a Module, found {shown(given, 80)}; {advice}")
+
+
 def _mark(params: Any) -> Any:
     """What shows that parameters were changed in place: their numbers, also of what holds a number that may change."""
     if params is None:

@@ -194,6 +194,8 @@ def test_the_minimum_near_the_border(monkeypatch: pytest.MonkeyPatch) -> None:
     ({"motion_noise": (1, 1, 1)}, "motion_noise was given without noise"),
     ({"noise": 1, "motion_noise": 1}, "motion_noise is 1; pass deviations of q, of u and of ud"),
     ({"noise": 1, "motion_noise": (1, -1, 1)}, "motion_noise of u is -1; pass a number, or 6, none negative"),
+    ({"friction": 3}, "friction is 3; pass a list of viscous and coulomb"),
+    ({"consistent": True, "nominal": [1]}, r"nominal is \[1\]; pass a dictionary from bodies to ten numbers each"),
     ({"friction": ["dry"]}, "friction has 'dry'; there are viscous and coulomb"),
     ({"spread": 0}, "spread is 0; pass a positive number up to 100"),
     ({"nominal": {}}, "nominal inertias were given without consistent=True"),
@@ -214,6 +216,7 @@ def test_faults_of_what_is_asked(given: dict[str, Any], text: str) -> None:
     ({"cutoff": 99.0}, "cutoff of motion 1 is 99.0; pass a frequency between 0 and 15 Hz"),
     ({"cutoff": 0.3}, "motion 1 lasts 10 s, too short for the cutoff 0.3 Hz"),
     ({"t": T**1.1, "cutoff": 5.0}, "motion 1 has a cutoff, but its times are not equally spaced"),
+    ({"params": [1]}, r"params of motion 1 are \[1\]; pass a dictionary from names to numbers"),
     ({"params": {"m9": 1}}, "there is no 'm9'")])
 def test_faults_of_data(given: dict[str, Any], text: str) -> None:
     q, u, ud = motion()
@@ -222,6 +225,9 @@ def test_faults_of_data(given: dict[str, Any], text: str) -> None:
 
 
 def test_other_faults() -> None:
+    for function, given in ((sd.identify, (measured(0),)), (sd.fit, (None,)), (sd.optimize, (None, 1.0))):
+        with pytest.raises(ArgumentError, match=rf"sd\.{function.__name__} needs a Module, found .*; compile it: sys"):
+            function(sd.systems.pendulum(), *given)  # type: ignore[operator]
     with pytest.raises(ArgumentError, match=r"data is 3; pass an sd.MeasuredMotion or a list of them"):
         sd.identify(robot(), 3)  # type: ignore[arg-type]
     q, u, ud = motion()

@@ -64,6 +64,12 @@ def test_a_disturbed_motion_is_kept() -> None:
                   for inputs in (sd.Sampled(of_motion, 0.01), optimum.table))
     assert np.abs(kept).max() < 0.1 and np.abs(left).max() > 1
     assert repr(of_motion) == "<Tracking of cart_pole from 0 to 1 s by F>"
+    with pytest.raises(sd.ArgumentError, match=r"x of a regulator has the shape \(3,\); needed is \(4,\)"):
+        of_motion(0.5, np.zeros(3))
+    with pytest.raises(sd.ArgumentError, match=r"cart_pole: t.* must be .*number"):
+        of_motion("late", np.zeros(4))
+    with pytest.raises(sd.ArgumentError, match=r"cart_pole: x of a regulator must be numbers"):
+        of_motion(0.5, "upright")
 
 
 def test_motions_without_a_regulator() -> None:
