@@ -525,7 +525,7 @@ class _Search:
         for k in self.pairs:
             base = self.exact.bases[k]
             rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
-            constant = sp.Add(*[_exact(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
+            constant = sp.Add(*[_exact(f) * sp.Mul(*[self.writer.angles.node(n) for n in term]) for term, f in base.items()
                                 if not set(term) & self.unknown_leaves])
             right.append({**angles, **loose}[k] - constant)
         found = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))

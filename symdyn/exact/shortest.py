@@ -8,6 +8,7 @@ angles, nested. Nothing depends on time, hash seeds or the machine.
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
@@ -49,6 +50,49 @@ MULTIPLE = 10
 LONGER, FACTOR_TERMS, NEAR = 2.4, 250, 1.6
 
 
+class WrittenAngles:
+    """Combinations of the base angles of an Exact, as SymPy expressions in the user's symbols."""
+
+    def __init__(self, exact: Exact, symbols: Mapping[Node, sp.Expr]) -> None:
+        self.bases, self.symbols = exact.bases, symbols
+        self._known: dict[tuple[int, ...], sp.Expr] = {}
+
+    def expression(self, vector: tuple[int, ...]) -> sp.Expr:
+        """The angle."""
+        if vector not in self._known:
+            total = self._terms(vector)
+            e = sp.Add(*[number(factor) * sp.Mul(*[self.node(node) for node in term])
+                         for term, factor in total.items() if factor])
+            if any(isinstance(node, Inverse) for term in total for node in term):
+                e = min(e, sp.together(e), key=sp.count_ops)
+            self._known[vector] = e
+        return self._known[vector]
+
+    def _terms(self, vector: tuple[int, ...]) -> dict[Any, Fraction]:
+        """A combination of the base angles as a sum of terms with their factors."""
+        total: dict[Any, Fraction] = {}
+        for k, n in enumerate(vector):
+            for term, factor in self.bases[k].items() if n else ():
+                total[term] = total.get(term, Fraction(0)) + n * factor
+        return total
+
+    def node(self, node: Node | Inverse) -> sp.Expr:
+        """What stands in an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
+        if isinstance(node, Inverse):
+            return 1 / self.node(node.node)
+        if node.op == "leaf":
+            return self.symbols.get(node, sp.Symbol(node.args[1]))
+        return expand(Output.of("angle", node), self.symbols)
+
+    def opposite(self, vector: tuple[int, ...]) -> bool:
+        """Whether the opposite of the angle is the one to write."""
+        terms = {term: factor for term, factor in self._terms(vector).items() if factor}
+        signs = sum(1 if factor > 0 else -1 for factor in terms.values())
+        if signs and all(node.op == "leaf" for term in terms for node in term):
+            return signs < 0  # SymPy's rule, which breaks ties by its order of symbols
+        return bool(self.expression(vector).could_extract_minus_sign())
+
+
 class Writer:
     """Writes values of one Exact.
 
@@ -59,9 +103,9 @@ class Writer:
     def __init__(self, exact: Exact, symbols: Mapping[Node, sp.Expr], form: str = "shortest", zeros: Sequence[Any] = ()) -> None:
         self.exact, self.symbols, self.form = exact, symbols, form
         self._expressions: dict[int, sp.Expr] = {}
-        self._angles: dict[tuple[int, ...], sp.Expr] = {}
         self._kinds: dict[int, str] = {}
-        self.letters = Letters(exact, self._opposite)
+        self.angles = WrittenAngles(exact, symbols)
+        self.letters = Letters(exact, self.angles.opposite)
         self._rows: list[Letter] = []
         self.arranger = Arranger(_Lookup(self))
         self._written: dict[Any, sp.Expr] = {}
@@ -76,39 +120,6 @@ class Writer:
 
     # -- letters
 
-    def _angle(self, vector: tuple[int, ...]) -> sp.Expr:
-        if vector not in self._angles:
-            total = self._terms(vector)
-            e = sp.Add(*[number(factor) * sp.Mul(*[self._node(node) for node in term])
-                         for term, factor in total.items() if factor])
-            if any(isinstance(node, Inverse) for term in total for node in term):
-                e = min(e, sp.together(e), key=sp.count_ops)
-            self._angles[vector] = e
-        return self._angles[vector]
-
-    def _terms(self, vector: tuple[int, ...]) -> dict[Any, Fraction]:
-        """A combination of the base angles as a sum of terms with their factors."""
-        total: dict[Any, Fraction] = {}
-        for k, n in enumerate(vector):
-            for term, factor in self.exact.bases[k].items() if n else ():
-                total[term] = total.get(term, Fraction(0)) + n * factor
-        return total
-
-    def _node(self, node: Node | Inverse) -> sp.Expr:
-        """What stands in an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
-        if isinstance(node, Inverse):
-            return 1 / self._node(node.node)
-        if node.op == "leaf":
-            return self.symbols.get(node, sp.Symbol(node.args[1]))
-        return expand(Output.of("angle", node), self.symbols)
-
-    def _opposite(self, vector: tuple[int, ...]) -> bool:
-        terms = {term: factor for term, factor in self._terms(vector).items() if factor}
-        signs = sum(1 if factor > 0 else -1 for factor in terms.values())
-        if signs and all(node.op == "leaf" for term in terms for node in term):
-            return signs < 0  # SymPy's rule, which breaks ties by its order of symbols
-        return bool(self._angle(vector).could_extract_minus_sign())
-
     def expression(self, letter: int) -> sp.Expr:
         """What a letter is in SymPy."""
         if letter not in self._expressions:
@@ -122,14 +133,14 @@ class Writer:
     def _made(self, letter: int) -> sp.Expr:
         if letter in self.letters.turns:
             name, vector = self.letters.turns[letter]
-            return getattr(sp, name)(self._angle(vector))
+            return getattr(sp, name)(self.angles.expression(vector))
         if letter in self.letters.below:
             key = self.letters.below[letter]
             if key < 0:
                 return self.expression(-1 - key)
             return self.tree_expression(self._below(key)[1])
         if letter in self.exact.leaves:
-            return self._node(self.exact.leaves[letter])
+            return self.angles.node(self.exact.leaves[letter])
         return self._function(self.exact.atoms[letter])
 
     def _function(self, atom: Atom) -> Any:
@@ -316,7 +327,8 @@ class _Lookup(dict[int, Letter]):
 
     def __init__(self, writer: Writer) -> None:
         super().__init__()
-        self.writer = writer
+        # Not a cycle, so that all that a quantity took goes once it is written: the collector takes longer to find it.
+        self.writer: Writer = weakref.proxy(writer)
 
     def __missing__(self, k: int) -> Letter:
         e = self.writer.expression(k)
