@@ -29,7 +29,8 @@ Cost = tuple[int, int]
 # Longer polynomials are not given to the factorization. Up to ALL terms every grouping is tried at each level, above it the one
 # that leaves the fewest terms; Horner's scheme too up to BOTH terms, and up to HORNER where the grouping leaves more than CLEAR
 # of them. Squares of sums are looked for up to BOTH terms.
-FACTORED, ALL, BOTH, HORNER, CLEAR = 120, 16, 40, 600, 0.6
+FACTORED, ALL, BOTH, HORNER, CLEAR = 120, 16, 40, 150, 0.6
+_INTEGERS = {int}
 _UNIT: frozenset = frozenset({((), 1)})
 _KINDS = (("motion",), ("parameter",), ("position",))
 
@@ -81,13 +82,18 @@ class _Parts(dict[Monomial, tuple[Monomial, Monomial]]):
     def __init__(self, letters: Mapping[int, Letter], kinds: tuple[str, ...]) -> None:
         super().__init__()
         self.letters, self.kinds = letters, kinds
+        self._of_kinds: dict[int, bool] = {}
 
     def __missing__(self, m: Monomial) -> tuple[Monomial, Monomial]:
         own: list[tuple[int, int]] = []
         rest: list[tuple[int, int]] = []
+        of_kinds = self._of_kinds
         for item in m:
-            (own if self.letters[item[0]].kind in self.kinds else rest).append(item)
-        parts = self[m] = tuple(own), tuple(rest)
+            letter = item[0]
+            if letter not in of_kinds:
+                of_kinds[letter] = self.letters[letter].kind in self.kinds
+            (own if of_kinds[letter] else rest).append(item)
+        parts = self[m] = (tuple(own), tuple(rest)) if own and rest else (m, ()) if own else ((), m)
         return parts
 
 
@@ -106,7 +112,7 @@ class Arranger:
     def product(self, number: Number, factors: Iterable[tuple[int | Sum, int]]) -> Product:
         """number * factors, without factors to the power zero."""
         kept = tuple([item for item in factors if item[1]])
-        operations, length = max(len(kept) - 1, 0), 0
+        operations, length = len(kept) - 1 if kept else 0, 0
         letters = self.letters
         for base, power in kept:
             if type(base) is int:
@@ -120,6 +126,13 @@ class Arranger:
             if power > 1:
                 operations += 1
                 length += 1
+        if number == 1 or number == -1:
+            if not kept:
+                return Product(number, kept, (0, 1))
+            for base, _ in kept:
+                if type(base) is not int or not letters[base].below:
+                    return Product(number, kept, (operations, length))
+            return Product(number, kept, (operations + 1, length))
         above, below = abs(number.numerator), number.denominator
         if below != 1 and isinstance(number, Fraction) and printed_as_decimal(number):
             above, below = 2, 1
@@ -159,8 +172,10 @@ class Arranger:
         first = sorted(item for item in parts.items() if isinstance(item[0], int))
         sums = [item for item in parts.items() if not isinstance(item[0], int)]
         best = self.product(number, [*first, *sums])
+        if not sums or number == 1 or number == -1:
+            return best
         size: Number = number if number > 0 else -number
-        if size != 1 and not printed_as_decimal(Fraction(size)):
+        if not printed_as_decimal(Fraction(size)):
             # l (2 a + b) / 2 is l (a + b / 2).
             for k, (base, power) in enumerate(sums):
                 if power == 1:
@@ -411,7 +426,7 @@ def stripped(p: Polynomial) -> tuple[Number, Monomial, Polynomial]:
     """Number and letters common to all terms, and what is left, in which most terms are positive."""
     numbers: list[Any] = list(p.values())
     number: Any = 1
-    if set(map(type, numbers)) == {int}:
+    if set(map(type, numbers)) == _INTEGERS:
         number = gcd(*numbers)
     elif any(printed_as_decimal(Fraction(c)) for c in numbers):
         size = abs(numbers[0])
@@ -490,8 +505,8 @@ def _coprime(rows: Mapping[tuple[int, ...], int], context: Any) -> bool:
 
 def _irreducible(q: Polynomial) -> bool:
     """Whether a letter stands in one term only, to the first power: then nothing but letters could be a factor."""
-    counts: dict[int, list[int]] = {}
+    powers: dict[int, int] = {}
     for m in q:
         for letter, n in m:
-            counts.setdefault(letter, []).append(n)
-    return any(powers == [1] for powers in counts.values())
+            powers[letter] = 0 if letter in powers else n
+    return 1 in powers.values()

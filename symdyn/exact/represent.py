@@ -89,7 +89,8 @@ class Letters:
 
 def plain(num: Any) -> Polynomial:
     """A polynomial of FLINT as a dict."""
-    return {tuple([(k, int(n)) for k, n in enumerate(exponents) if n]): integer(fraction(c)) for exponents, c in num.terms()}
+    return {tuple([(k, int(n)) for k, n in enumerate(exponents) if n]): int(c.p) if c.q == 1 else fraction(c)
+            for exponents, c in num.terms()}
 
 
 class Basis:
@@ -247,7 +248,8 @@ def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
                     result.pop(m, None)
         if len(result) > most:
             return None
-    return {m: integer(Fraction(c, 2**DEGREE)) for m, c in result.items()}
+    whole = 2**DEGREE
+    return {m: c // whole if c % whole == 0 else integer(Fraction(c, whole)) for m, c in result.items()}
 
 
 def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, int]]:
@@ -313,10 +315,11 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
     """Pairs of terms: the cosines of the angles that they stand for, both terms, what they become together, and its number as a
     multiple of the first one's."""
     turns, of = letters.turns, letters.of
-    have = {letter for m in p for letter, _ in m}
+    trig = {letter for m in p for letter, _ in m if letter in turns and turns[letter][0] != "tan"}
+    theorems: dict[tuple[int, int], Partner | None] = {}
     for m, a in list(p.items()):
-        trig = [item for item in m if item[0] in turns and turns[item[0]][0] != "tan"]
-        for x, n in trig:
+        own = [item for item in m if item[0] in trig]
+        for x, n in own:
             if n >= 2:
                 name, v = turns[x]
                 rest = _less(m, x, 2)
@@ -326,17 +329,16 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
                     yield (x, x), m, rest, squared, -1
                 elif name == "cos" and p.get(squared) == a:
                     yield (x, x), m, squared, rest, 1
-        for x, _ in trig:
-            for y, _ in trig:
-                # Cosines once a pair; a sine first.
-                if x == y or (x > y and turns[x][0] == "cos"):
-                    continue
-                found = letters.partner(x, y)
+        for x, _ in own:
+            for y, _ in own:
+                if (x, y) not in theorems:
+                    # Cosines once a pair; a sine first.
+                    found = None if x == y or (x > y and turns[x][0] == "cos") else letters.partner(x, y)
+                    theorems[x, y] = found if found is not None and found[0] in trig and found[1] in trig else None
+                found = theorems[x, y]
                 if found is None:
                     continue
                 one, two, same, opposite = found
-                if one not in have or two not in have:
-                    continue
                 rest = _less(_less(m, x, 1), y, 1)
                 other_term = multiplied(rest, ((one, 1), (two, 1)) if one < two else ((two, 1), (one, 1)))
                 b = p.get(other_term)

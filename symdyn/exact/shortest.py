@@ -56,6 +56,7 @@ class WrittenAngles:
     def __init__(self, exact: Exact, symbols: Mapping[Node, sp.Expr]) -> None:
         self.bases, self.symbols = exact.bases, symbols
         self._known: dict[tuple[int, ...], sp.Expr] = {}
+        self._opposites: dict[tuple[int, ...], bool] = {}
 
     def expression(self, vector: tuple[int, ...]) -> sp.Expr:
         """The angle."""
@@ -86,10 +87,20 @@ class WrittenAngles:
 
     def opposite(self, vector: tuple[int, ...]) -> bool:
         """Whether the opposite of the angle is the one to write."""
+        if vector not in self._opposites:
+            self._opposites[vector] = self._is_opposite(vector)
+        return self._opposites[vector]
+
+    def _is_opposite(self, vector: tuple[int, ...]) -> bool:
+        """SymPy's rule, which it applies to arguments of sines: more minus signs than plus signs; of as many, one before the
+        first symbol in SymPy's order."""
         terms = {term: factor for term, factor in self._terms(vector).items() if factor}
         signs = sum(1 if factor > 0 else -1 for factor in terms.values())
         if signs and all(node.op == "leaf" for term in terms for node in term):
-            return signs < 0  # SymPy's rule, which breaks ties by its order of symbols
+            return signs < 0
+        if all(len(term) == 1 and term[0].op == "leaf" for term in terms):
+            first = min(terms, key=lambda term: self.node(term[0]).sort_key())
+            return terms[first] < 0
         return bool(self.expression(vector).could_extract_minus_sign())
 
 
