@@ -17,6 +17,10 @@ from symdyn.exact.walk import Exact
 
 Vector = tuple[int, ...]
 Partner = tuple[int, int, tuple[int, int], tuple[int, int]]
+# Letters that stand squared: the term without the square, with the other function's square, whether it is a cosine's. Pairs of
+# letters: the term without them, the other term of a theorem of sums, and what both are for the same number and the opposite.
+Theorems = tuple[list[tuple[tuple[int, int], Monomial, Monomial, bool]],
+                 list[tuple[tuple[int, int], Monomial, Monomial, tuple[int, int], tuple[int, int]]]]
 # Fourier forms with this many times the terms of the polynomial are not made; products of more sines neither.
 GROWTH, DEGREE = 4, 8
 # Sums of angles that are tried as base angles.
@@ -41,6 +45,7 @@ class Letters:
         self._numbers: dict[tuple[str, Vector], int] = {}
         self._series: dict[Monomial, list[tuple[Monomial, int]]] = {}
         self._partners: dict[tuple[int, int], Partner | None] = {}
+        self._theorems: dict[Monomial, Theorems] = {}
         self.sines = exact.sines
         for k, (s, c) in enumerate(exact.sines):
             unit = tuple(int(i == k) for i in range(n))
@@ -81,6 +86,12 @@ class Letters:
         if (x, y) not in self._partners:
             self._partners[x, y] = _partner(x, y, self)
         return self._partners[x, y]
+
+    def theorems(self, m: Monomial) -> Theorems:
+        """What this term may be combined with."""
+        if m not in self._theorems:
+            self._theorems[m] = _theorems(m, self)
+        return self._theorems[m]
 
     def _new(self) -> int:
         self._next += 1
@@ -314,38 +325,41 @@ def contracted(p: Polynomial, letters: Letters) -> Polynomial:
 def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int], Monomial, Monomial, Monomial, int]]:
     """Pairs of terms: the cosines of the angles that they stand for, both terms, what they become together, and its number as a
     multiple of the first one's."""
-    turns, of = letters.turns, letters.of
-    trig = {letter for m in p for letter, _ in m if letter in turns and turns[letter][0] != "tan"}
-    theorems: dict[tuple[int, int], Partner | None] = {}
     for m, a in list(p.items()):
-        own = [item for item in m if item[0] in trig]
-        for x, n in own:
-            if n >= 2:
-                name, v = turns[x]
-                rest = _less(m, x, 2)
-                other = of("sin" if name == "cos" else "cos", v)[0]
-                squared = multiplied(rest, ((other, 2),))
-                if p.get(rest) == -a:
-                    yield (x, x), m, rest, squared, -1
-                elif name == "cos" and p.get(squared) == a:
-                    yield (x, x), m, squared, rest, 1
-        for x, _ in own:
-            for y, _ in own:
-                if (x, y) not in theorems:
-                    # Cosines once a pair; a sine first.
-                    found = None if x == y or (x > y and turns[x][0] == "cos") else letters.partner(x, y)
-                    theorems[x, y] = found if found is not None and found[0] in trig and found[1] in trig else None
-                found = theorems[x, y]
-                if found is None:
-                    continue
+        squares, sums = letters.theorems(m)
+        for kind, rest, squared, is_cosine in squares:
+            if p.get(rest) == -a:
+                yield kind, m, rest, squared, -1
+            elif is_cosine and p.get(squared) == a:
+                yield kind, m, squared, rest, 1
+        for kind, rest, other, same, opposite in sums:
+            b = p.get(other)
+            if b is not None and abs(b) == abs(a):
+                letter, sign = same if b == a else opposite
+                yield kind, m, other, multiplied(rest, ((letter, 1),)), sign
+
+
+def _theorems(m: Monomial, letters: Letters) -> Theorems:
+    """Terms with which this one is a shorter one: by the squares of sine and cosine, and by theorems of sums."""
+    turns, of = letters.turns, letters.of
+    squares, sums = [], []
+    trig = [item for item in m if item[0] in turns and turns[item[0]][0] != "tan"]
+    for x, n in trig:
+        if n >= 2:
+            name, v = turns[x]
+            rest = _less(m, x, 2)
+            other = of("sin" if name == "cos" else "cos", v)[0]
+            squares.append(((x, x), rest, multiplied(rest, ((other, 2),)), name == "cos"))
+    for x, _ in trig:
+        for y, _ in trig:
+            # Cosines once a pair; a sine first.
+            found = None if x == y or (x > y and turns[x][0] == "cos") else letters.partner(x, y)
+            if found is not None:
                 one, two, same, opposite = found
                 rest = _less(_less(m, x, 1), y, 1)
                 other_term = multiplied(rest, ((one, 1), (two, 1)) if one < two else ((two, 1), (one, 1)))
-                b = p.get(other_term)
-                if b is None or abs(b) != abs(a):
-                    continue
-                letter, sign = same if b == a else opposite
-                yield (x, y), m, other_term, multiplied(rest, ((letter, 1),)), sign
+                sums.append(((x, y), rest, other_term, same, opposite))
+    return squares, sums
 
 
 def halved(p: Polynomial, letters: Letters) -> Polynomial | None:

@@ -46,7 +46,7 @@ TERMS = 20_000
 MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before
 # SymPy combines terms; up to FACTOR_TERMS operations common factors are taken out of it, if it then has no more than NEAR times
-# as many.
+# as many. SymPy's factor_terms leads to longer ones and takes ten times as long.
 LONGER, FACTOR_TERMS, NEAR = 2.4, 250, 1.6
 
 
@@ -208,9 +208,9 @@ class Writer:
         tree = self.tree(value)
         result = _turned_below(self.tree_expression(tree))
         if derived is not None and operations <= LONGER * total(tree)[0]:
-            other, count = derived(NEAR * total(tree)[0])
+            other, count = derived(total(tree)[0])
             if count < sp.count_ops(result):
-                return min((other, _taken_out(other)), key=sp.count_ops) if count <= FACTOR_TERMS else other
+                return min((other, _taken_out(other)), key=sp.count_ops) if operations > FACTOR_TERMS >= count else other
         return result
 
     def tree(self, value: Value) -> Tree:
@@ -470,22 +470,61 @@ def written_out(entries: Sequence[Any]) -> dict[Node, int]:
 
 
 def _taken_out(e: Any) -> Any:
-    """What stands in several terms of a sum, but not in all, taken out of these: a b + a c + d as a (b + c) + d."""
+    """What stands in several terms of a sum taken out of these: a b + a**2 c + d as a (b + a c) + d."""
     if not e.args or not e.has(sp.Add):
         return e
     e = e.func(*[_taken_out(a) for a in e.args])
     if not e.is_Add:
         return e
-    terms = [sp.Mul.make_args(term) for term in e.args]
-    counts: dict[sp.Expr, int] = {}
-    for factor in [factor for term in terms for factor in term if not factor.is_Number]:
-        counts[factor] = counts.get(factor, 0) + 1
+    return sp.Add(*[sp.Mul(*[number, *[sp.Pow(b, n) for b, n in powers.items()]])
+                    for number, powers in _gathered([_powers(term) for term in e.args])])
+
+
+def _powers(term: Any) -> tuple[Any, dict[Any, Any]]:
+    """The number of a product and its factors with their rational exponents."""
+    number, rest = term.as_coeff_Mul()
+    powers: dict[Any, Any] = {}
+    for factor in sp.Mul.make_args(rest):
+        base, exponent = factor.as_base_exp()
+        if not exponent.is_Rational:
+            base, exponent = factor, sp.S.One
+        powers[base] = powers.get(base, 0) + exponent
+    powers.pop(sp.S.One, None)
+    return number, powers
+
+
+def _gathered(terms: list[tuple[Any, dict[Any, Any]]]) -> list[tuple[Any, dict[Any, Any]]]:
+    """Terms with what stands in most of them taken out, again and again."""
+    counts: dict[tuple[Any, bool], int] = {}
+    for _, powers in terms:
+        for base, exponent in powers.items():
+            key = base, bool(exponent > 0)
+            counts[key] = counts.get(key, 0) + 1
     most = max(counts.values(), default=0)
     if most < 2:
+        return terms
+    common, above = min([key for key, n in counts.items() if n == most],
+                        key=lambda key: (not key[1], sp.default_sort_key(key[0])))
+    having, others = [], []
+    for term in terms:
+        (having if common in term[1] and bool(term[1][common] > 0) == above else others).append(term)
+    least = min([powers[common] for _, powers in having], key=abs)
+    inside = [(number, {base: n - least if base == common else n for base, n in powers.items() if base != common or n != least})
+              for number, powers in having]
+    total = sp.Add(*[sp.Mul(number, *[sp.Pow(b, n) for b, n in powers.items()]) for number, powers in _gathered(inside)])
+    number, powers = _powers(total)
+    powers[common] = powers.get(common, 0) + least
+    return [(number, powers), *_gathered(others)]
+
+
+def _number_out(e: Any) -> Any:
+    """The number common to the terms of a sum before it, and the sign where all have a minus."""
+    if not e.is_Add or e.has(sp.Float):
         return e
-    common = min([factor for factor, n in counts.items() if n == most], key=sp.default_sort_key)
-    inside = sp.Add(*[sp.Mul(*[f for f in term if f != common]) for term in terms if common in term])
-    return sp.Mul(common, _taken_out(inside)) + _taken_out(sp.Add(*[sp.Mul(*term) for term in terms if common not in term]))
+    number, rest = e.primitive()
+    if all(term.as_coeff_Mul()[0].is_negative for term in rest.args):
+        number, rest = -number, sp.Add(*[-term for term in rest.args])
+    return e if number == 1 else sp.Mul(number, rest, evaluate=False)
 
 
 def _is_square(value: Any) -> bool:
@@ -496,14 +535,18 @@ def _is_root_of_square(e: Any) -> bool:
     return bool(e.is_Pow and abs(e.exp) == sp.Rational(1, 2) and e.base.is_Pow and e.base.exp == 2)
 
 
-def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, near: float) -> tuple[sp.Expr, int]:
-    """As it stands on the tape, and its operations; where these are no more than `near`, common factors are taken out of sums if
-    that is shorter and does not take long."""
+def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, least: float) -> tuple[sp.Expr, int]:
+    """As it stands on the tape, and its operations; where these are few and come near to `least`, those of another form, common
+    factors are taken out of sums if that is shorter."""
     found = expand(Output.of("entry", entry), symbols)
     if any(node.op == "sqrt" and _is_square(node.args[0]) for node in reachable([entry])):
         found = found.replace(_is_root_of_square, lambda root: sp.Abs(root.base.base) ** (2 * root.exp))
     count = int(sp.count_ops(found))
-    if size > FACTOR_TERMS or count > near:
+    if size > FACTOR_TERMS or count > NEAR * least:
         return found, count
-    factored = sp.factor_terms(found)
-    return min((found, count), (factored, int(sp.count_ops(factored))), key=lambda form: form[1])
+    taken = _taken_out(found)
+    return min([(found, count), *map(_counted, (taken, _number_out(taken)))], key=lambda form: form[1])
+
+
+def _counted(e: sp.Expr) -> tuple[sp.Expr, int]:
+    return e, int(sp.count_ops(e))
