@@ -10,6 +10,7 @@ Source of the nesting: Ceberio and Kreinovich, Greedy algorithms for optimizing 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -27,9 +28,12 @@ Polynomial = dict[Monomial, Number]
 Cost = tuple[int, int]
 
 # Longer polynomials are not given to the factorization. Up to ALL terms every grouping is tried at each level, above it the one
-# that leaves the fewest terms; Horner's scheme too up to BOTH terms, and up to HORNER where the grouping leaves more than CLEAR
-# of them. Squares of sums are looked for up to BOTH terms.
-FACTORED, ALL, BOTH, HORNER, CLEAR = 120, 16, 40, 150, 0.6
+# that leaves the fewest terms; Horner's scheme too up to BOTH terms, and up to HORNER, or FEWER_HORNER where one grouping is
+# clearly best, where the grouping leaves more than CLEAR of them. Squares of sums are looked for up to BOTH terms.
+FACTORED, ALL, BOTH, CLEAR, HORNER, FEWER_HORNER = 120, 16, 40, 0.6, 600, 150
+# A grouping is clearly best if it leaves less than FEWER of the terms, and than BETTER of those that the next best one leaves,
+# and no letter has more than LONG operations: such letters are worth to be written seldom.
+FEWER, BETTER, LONG = 0.7, 0.92, 4
 _INTEGERS = {int}
 _UNIT: frozenset = frozenset({((), 1)})
 _KINDS = (("motion",), ("parameter",), ("position",))
@@ -104,6 +108,7 @@ class Arranger:
         self.letters = letters
         self._known: dict[frozenset, Tree] = {}
         self._split: dict[frozenset, Any] = {}
+        self._most = HORNER
         self._parts: dict[tuple[str, ...], _Parts] = {
             kinds: _Parts(letters, kinds) for kinds in (*_KINDS, ("motion", "position"), ("position", "motion"))}
 
@@ -239,6 +244,19 @@ class Arranger:
         groups = self._groups(p, kinds)
         return None if groups is None else self._gathered(groups, inner or self.nested)
 
+    def clearly_gathered(self, p: Polynomial, kinds: tuple[str, ...]) -> Tree | None:
+        """Gathered by letters of these kinds together, where that leaves clearly fewer terms than by those of one kind."""
+        groups = self._groups(p, kinds)
+        left = _left(groups)
+        if groups is None or left >= FEWER * len(p) or left >= BETTER * min([_left(self._groups(p, (kind,))) for kind in kinds]):
+            return None
+        if any(self.letters[letter].operations > LONG for letter in {letter for m in p for letter, _ in m}):
+            return None
+        self._most = FEWER_HORNER
+        tree = self._gathered(groups, self.nested)
+        self._most = HORNER
+        return tree
+
     def _groups(self, p: Polynomial, kinds: tuple[str, ...]) -> list[tuple[Polynomial, Polynomial]] | None:
         """Pairs of polynomials whose products add up: letters of these kinds with what is common, and all others."""
         rows: dict[Monomial, list[Monomial]] = {}
@@ -304,7 +322,7 @@ class Arranger:
             return self.times(1, (), [(self.nested(f), n) for f, n in parts])
         groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
         # Terms that are left to arrange tell which of them are worth it.
-        left = [sum(len(a) + len(b) for a, b in g) for g in groups]
+        left = [_left(g) for g in groups]
         if len(q) > ALL and groups:
             groups = [groups[left.index(min(left))]] if min(left) < len(q) else []
         found: list[Tree] = []
@@ -314,7 +332,7 @@ class Arranger:
             found.append(self._gathered(group, self.nested))
             if total(found[-1])[0] == once:  # each letter stands in it once
                 return found[-1]
-        if not groups or len(q) <= BOTH or (len(q) <= HORNER and min(left) > CLEAR * len(q)):
+        if not groups or len(q) <= BOTH or (len(q) <= self._most and min(left) > CLEAR * len(q)):
             found.append(self.horner(q))
         squares = self._squares(q) if len(q) <= BOTH else None
         if squares is not None:
@@ -413,6 +431,11 @@ class Arranger:
                 result.append(({(): integer(number)}, 1))
         self._split[key] = result
         return result
+
+
+def _left(groups: Sequence[tuple[Polynomial, Polynomial]] | None) -> float:
+    """Terms that are left to arrange."""
+    return math.inf if groups is None else sum(len(a) + len(b) for a, b in groups)
 
 
 def _resigned(tree: Sum) -> Cost:

@@ -34,7 +34,8 @@ from symdyn.tape.tape import Output, reachable
 FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters", "angles", "nested")
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
 # Kinds of letters that whole entries are gathered by, and those of them that take little time for long entries.
-_GATHERED_LONG = (("position",), ("motion", "position"))
+_STATE = ("motion", "position")
+_GATHERED_LONG = (("position",), _STATE)
 _GATHERED = (("motion",), ("parameter",), *_GATHERED_LONG)
 _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
@@ -308,10 +309,12 @@ class Writer:
             return [a.nested(p)]
         if self.form in _GROUPS:
             return [a.grouped(p, _GROUPS[self.form]) or a.factored(p)]
-        trees: list[Tree | None] = [a.nested(p)]
+        best = a.clearly_gathered(p, _STATE) if len(p) > LONG else None
+        if best is not None:
+            return [best]
+        trees = [a.nested(p), *[a.grouped(p, kinds) for kinds in (_GATHERED if len(p) <= LONG else _GATHERED_LONG)]]
         if len(p) <= SHORT:
             trees.append(a.expanded(p))
-        trees += [a.grouped(p, kinds) for kinds in (_GATHERED if len(p) <= LONG else _GATHERED_LONG)]
         return [tree for tree in trees if tree is not None]
 
     # -- SymPy
@@ -505,7 +508,8 @@ def _gathered(terms: list[tuple[Any, dict[Any, Any]]]) -> list[tuple[Any, dict[A
         return terms
     common, above = min([key for key, n in counts.items() if n == most],
                         key=lambda key: (not key[1], sp.default_sort_key(key[0])))
-    having, others = [], []
+    having: list[tuple[Any, dict[Any, Any]]] = []
+    others: list[tuple[Any, dict[Any, Any]]] = []
     for term in terms:
         (having if common in term[1] and bool(term[1][common] > 0) == above else others).append(term)
     least = min([powers[common] for _, powers in having], key=abs)

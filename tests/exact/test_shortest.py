@@ -1,13 +1,19 @@
 """What exact algebra writes has the value of what was given, reads back as the same, and is never longer."""
 
+import gc
+import weakref
+from itertools import product
+
 import pytest
 import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, SymdynError
+from symdyn.exact import shortest as shortest_module
 from symdyn.exact.ring import TooLarge
-from symdyn.exact.shortest import FORMS, shortest, written
+from symdyn.exact.shortest import FORMS, WrittenAngles, shortest, written
 from symdyn.exact.taken import recorded
+from symdyn.exact.walk import Exact
 from symdyn.lab import exact_expressions
 from symdyn.model.symbols import symbols_of
 
@@ -196,3 +202,49 @@ def test_squares_of_euler_parameters_add_up_to_one(formulation):
         short, derived = (sp.Matrix([eq.explicit(name, simplify=way)]) for way in (True, False))
         assert all(e == 0 for e in (short - derived).subs(values))
         assert sp.count_ops(short) <= sp.count_ops(derived)
+
+
+def test_the_opposite_of_an_angle_is_written_as_sympy_has_it():
+    """SymPy turns arguments of sines itself; letters whose sign it changes would be counted wrongly."""
+    angles = {q: sp.sin(q) for q in (*sd.coordinates("phi theta psi q10 q2 Q"), *sd.parameters("w a"), sd.t)}
+    entries, symbols = recorded(list(angles.values()))
+    exact = Exact(entries)
+    written_angles = WrittenAngles(exact, symbols)
+    rows = [vector for vector in product((-2, -1, 0, 1), repeat=len(exact.bases)) if 1 < sum(map(bool, vector)) < 4]
+    assert len(rows) > 2000
+    for vector in rows[::7]:
+        angle = written_angles.expression(vector)
+        assert written_angles.opposite(vector) == angle.could_extract_minus_sign(), angle
+
+
+@pytest.mark.parametrize(("given", "wanted"), [
+    (a**2 * b + a**3 * c + b, "a**2*(a*c + b) + b"),
+    (b / sp.sqrt(a) + c / sp.sqrt(a) ** 3, "(b + c/a)/sqrt(a)"),
+    (a * b + a * c + b * c, "a*(b + c) + b*c"),
+    (sp.exp(a) * b + sp.exp(a) * c, "(b + c)*exp(a)"),
+    (sp.sin(a * b + a * c), "sin(a*(b + c))"),
+])
+def test_what_stands_in_several_terms_is_taken_out(given, wanted):
+    assert str(shortest_module._taken_out(given)) == wanted
+
+
+@pytest.mark.parametrize(("given", "wanted"), [
+    (2 * a - 2 * b, "2*(a - b)"), (-a - b, "-(a + b)"), (-2 * a - 4 * b, "-2*(a + 2*b)"), (a / 2 + b / 2, "(a + b)/2"),
+    (a - b, "a - b"), (-0.5 * a - b, "-0.5*a - b"), (a * b, "a*b")])
+def test_the_number_common_to_all_terms_is_taken_out(given, wanted):
+    assert str(shortest_module._number_out(given)) == wanted
+
+
+def test_nothing_is_left_to_the_collector():
+    """What a quantity took is large: a search for it takes longer than to write many a quantity."""
+    made = []
+    entries, symbols = recorded([a * sp.sin(q1 + q2) + b])
+    gc.disable()
+    try:
+        writer = shortest_module.Writer(Exact(entries), symbols)
+        made.append(weakref.ref(writer))
+        writer.write(writer.exact.values[0])
+        del writer
+        assert made[0]() is None
+    finally:
+        gc.enable()
