@@ -11,6 +11,7 @@ Source: Cox, Little, O'Shea, Ideals, Varieties, and Algorithms, chapters 3 and 6
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -20,13 +21,14 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.analytic.linear import State
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.exact.prove import prove, with_known_angles
 from symdyn.exact.represent import plain
 from symdyn.exact.shortest import Writer, not_negative, written
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Exact
 from symdyn.model.symbols import symbols_of, time
+from symdyn.real_numbers import NotReal, number
 from symdyn.report.limit import TimeUp, within
 from symdyn.shown import shown
 from symdyn.tape.jumps import description, jumps
@@ -109,26 +111,39 @@ class EquilibriumPoints:
 
 
 def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, values: Mapping[Any, Any] | None = None,
-               ) -> EquilibriumPoints:
+               seconds: float | None = None) -> EquilibriumPoints:
     """All states of rest.
 
     fixed    coordinates, which are held there; inputs and extra states; or speeds, of a steady motion: by symbol or name, numbers
              or expressions in parameters. Speeds and inputs that are left out are zero
     values   numbers for parameters, by symbol or name; decimal ones stand for the decimals that they are printed as
-    Raises SymdynError where the conditions are no polynomials, or not solved in closed form or in time: with the reason.
+    seconds  that the search may take; default: the equations' simplify_seconds
+    Raises SymdynError where the conditions are no polynomials, or not solved in closed form or in time: with the reason; and
+    ArgumentError for seconds that are no positive number.
     """
     if isinstance(values, Mapping):
         values = {key: _decimal(value) for key, value in values.items()}
     state = State(equations, fixed, (), values, "fixed")
     search = _Search(state)
-    seconds = max(equations.simplify_seconds, 1.0)
+    limit = max(equations.simplify_seconds, 1.0) if seconds is None else _positive(seconds, equations.name)
     try:
-        return within(seconds, search.result)
+        return within(limit, search.result)
     except TimeUp:
         left = len(equations.symbols.parameters) - len(state.parameters)
         numbers = "pass numbers for parameters with values=..., " if left else ""
-        raise SymdynError(f"{equations.name}: equilibria in closed form were not found within {seconds:g} s; {numbers}fix "
-                          "coordinates, or use module.equilibria()") from None
+        raise SymdynError(f"{equations.name}: equilibria in closed form were not found within {limit:g} s; {numbers}fix "
+                          "coordinates, give more time with seconds=..., or use module.equilibria()") from None
+
+
+def _positive(seconds: Any, name: str) -> float:
+    try:
+        found = number(seconds)
+    except NotReal as error:
+        raise ArgumentError(f"{name}: seconds must be a positive number, found {shown(seconds)}: {error}") from None
+    if not 0 < found <= threading.TIMEOUT_MAX:
+        raise ArgumentError(f"{name}: seconds must be a positive number up to {threading.TIMEOUT_MAX:.3g}, found "
+                            f"{shown(seconds)}")
+    return found
 
 
 @dataclass(frozen=True)

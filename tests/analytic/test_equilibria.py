@@ -206,13 +206,17 @@ def test_what_has_no_closed_form():
 
 
 def test_time_is_bounded():
-    import dataclasses
-
     eq = sd.systems.get("four_bar").augmented()
-    with pytest.raises(SymdynError, match=r"were not found within 1 s; fix coordinates, or use module.equilibria"):
-        dataclasses.replace(eq, simplify_seconds=1.0).equilibria(values=eq.symbols.defaults)
-    with pytest.raises(SymdynError, match=r"were not found within 1 s; pass numbers for parameters with values=\.\.\."):
-        dataclasses.replace(eq, simplify_seconds=1.0).equilibria({"q1": sp.Symbol("alpha", real=True)})
+    with pytest.raises(SymdynError, match=r"were not found within 1 s; fix coordinates, give more time with seconds="):
+        eq.equilibria(values=eq.symbols.defaults, seconds=1)
+    with pytest.raises(SymdynError, match=r"were not found within 0.5 s; pass numbers for parameters with values=\.\.\., fix"):
+        eq.equilibria({"q1": sp.Symbol("alpha", real=True)}, seconds=0.5)
+
+
+@pytest.mark.parametrize("seconds", [0, -1.0, float("nan"), float("inf"), 1e300, "3", True, [1.0], 1j])
+def test_seconds_that_are_no_positive_number(seconds):
+    with pytest.raises(ArgumentError, match="pendulum: seconds must be a positive number"):
+        sd.systems.pendulum().embedding().equilibria(seconds=seconds)
 
 
 def test_bounds_on_cases_and_angles(monkeypatch):

@@ -147,15 +147,18 @@ class MotionEquations(Equations):
 
         return linearized(self, about, hold, coordinates)
 
-    def equilibria(self, fixed: Named[Scalar] | None = None, values: Named[Scalar] | None = None) -> EquilibriumPoints:
+    def equilibria(self, fixed: Named[Scalar] | None = None, values: Named[Scalar] | None = None,
+                   seconds: float | None = None) -> EquilibriumPoints:
         """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
 
         fixed    coordinates that are held, inputs, speeds of a steady motion -> numbers or expressions in parameters
         values   numbers for parameters
-        See symdyn.analytic.equilibria. Raises SymdynError with the reason where there is no closed form."""
+        seconds  that the search may take; default: simplify_seconds, which is 10
+        See symdyn.analytic.equilibria. Raises SymdynError with the reason where there is no closed form, and ArgumentError for
+        seconds that are no positive number."""
         from symdyn.analytic.equilibria import equilibria
 
-        return equilibria(self, fixed, values)
+        return equilibria(self, fixed, values, seconds)
 
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
         """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
