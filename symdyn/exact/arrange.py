@@ -449,7 +449,8 @@ def stripped(p: Polynomial) -> tuple[Number, Monomial, Polynomial]:
     """Number and letters common to all terms, and what is left, in which most terms are positive."""
     numbers: list[Any] = list(p.values())
     number: Any = 1
-    if set(map(type, numbers)) == _INTEGERS:
+    whole = set(map(type, numbers)) == _INTEGERS
+    if whole:
         number = gcd(*numbers)
     elif any(printed_as_decimal(Fraction(c)) for c in numbers):
         size = abs(numbers[0])
@@ -476,7 +477,7 @@ def stripped(p: Polynomial) -> tuple[Number, Monomial, Polynomial]:
         p = {tuple([(letter, n - common.get(letter, 0)) for letter, n in m if n != common.get(letter, 0)]): c
              for m, c in p.items()}
     if number != 1:
-        p = {m: _divided(c, number) for m, c in p.items()}
+        p = {m: c // number for m, c in p.items()} if whole else {m: _divided(c, number) for m, c in p.items()}
     return integer(number), tuple(sorted(common.items())), p
 
 

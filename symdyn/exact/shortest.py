@@ -47,8 +47,9 @@ TERMS = 20_000
 MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before
 # SymPy combines terms; up to FACTOR_TERMS operations common factors are taken out of it, if it then has no more than NEAR times
-# as many. SymPy's factor_terms leads to longer ones and takes ten times as long.
-LONGER, FACTOR_TERMS, NEAR = 2.4, 250, 1.6
+# as many. SymPy's factor_terms leads to longer ones and takes ten times as long. What has more than CLOSE times as many is not
+# the shortest.
+LONGER, FACTOR_TERMS, NEAR, CLOSE = 2.4, 250, 1.6, 1.2
 
 
 class WrittenAngles:
@@ -210,7 +211,8 @@ class Writer:
         result = _turned_below(self.tree_expression(tree))
         if derived is not None and operations <= LONGER * total(tree)[0]:
             other, count = derived(total(tree)[0])
-            if count < sp.count_ops(result):
+            # The cost of a tree is nearly the count of SymPy, which takes long.
+            if count <= CLOSE * total(tree)[0] and count < sp.count_ops(result):
                 return min((other, _taken_out(other)), key=sp.count_ops) if operations > FACTOR_TERMS >= count else other
         return result
 
@@ -549,7 +551,8 @@ def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, least
     if size > FACTOR_TERMS or count > NEAR * least:
         return found, count
     taken = _taken_out(found)
-    return min([(found, count), *map(_counted, (taken, _number_out(taken)))], key=lambda form: form[1])
+    forms = [(found, count), *map(_counted, [e for e in dict.fromkeys((taken, _number_out(taken))) if e != found])]
+    return min(forms, key=lambda form: form[1])
 
 
 def _counted(e: sp.Expr) -> tuple[sp.Expr, int]:
