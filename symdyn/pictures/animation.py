@@ -56,8 +56,10 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     drawing = whole.at(t, times)
     spans = np.ptp(whole.limits(), axis=1)
     height = 5.0 if drawing.spatial else 6.0 * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.6
-    figure = Picture(figsize=(6, height), layout="constrained", dpi=80)
+    figure = Picture(figsize=(6, height), layout=None if drawing.spatial else "constrained", dpi=80)
     axes = make_axes(figure, 111, whole, view)
+    if drawing.spatial:
+        axes.set_position((0.0, 0.0, 1.0, 0.96))
     trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8, zorder=ABOVE)[0]
     artists = make_artists(axes, drawing)
     axes.set_title(solution.module.name, fontsize=11)

@@ -12,8 +12,9 @@ from matplotlib.ticker import MaxNLocator
 from symdyn.errors import ArgumentError
 from symdyn.pictures.arrows import arrows
 from symdyn.pictures.drawing import Drawing
+from symdyn.pictures.looks import color_of_body
 from symdyn.pictures.scene import Scene
-from symdyn.pictures.style import MANY, colors_of
+from symdyn.pictures.style import MANY
 from symdyn.real_numbers import NotReal, real
 from symdyn.shown import shown
 
@@ -23,7 +24,7 @@ VIEW_OF_SOLIDS = (14.0, -58.0)
 # Of the axes' box before it is fitted.
 ZOOM = 0.79
 # Forces of contacts.
-FORCE = "tab:red"
+FORCE = "#B45309"
 # What is drawn over all shapes.
 ABOVE = 1e6
 
@@ -35,19 +36,23 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
     """
     elevation, azimuth = _view(view, drawing)
     axes: Any = figure.add_subplot(place, projection="3d" if drawing.spatial else None)
-    limits = drawing.limits()
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
+    limits, below = drawing.limits(), int(np.abs(drawing.up).argmax())
+    flipped = drawing.up[below] < 0 and below in drawing.axes
+    # An axis that points down is turned over, in space with the one before it: no picture is a mirror image.
+    over = {below, *([(below - 1) % 3] if drawing.spatial else ())} if flipped else set()
+    ends = [pair[::-1] if axis in over else pair for axis, pair in zip(drawing.axes, limits, strict=True)]
+    axes.set_xlim(*ends[0])
+    axes.set_ylim(*ends[1])
     axes.set_xlabel(f"{drawing.labels[0]} [m]")
     axes.set_ylabel(f"{drawing.labels[1]} [m]")
     if drawing.spatial:
-        axes.set_zlim(*limits[2])
+        axes.set_zlim(*ends[2])
         axes.set_zlabel(f"{drawing.labels[2]} [m]")
         axes.set_box_aspect(np.ptp(limits, axis=1), zoom=ZOOM)
-        axes.view_init(elev=elevation, azim=azimuth)
+        axes.view_init(elev=elevation, azim=azimuth, vertical_axis=drawing.labels[int(np.abs(drawing.up).argmax())])
         axes.tick_params(labelsize=8, pad=0)
-        axes.tick_params(axis="z", pad=3)
-        axes.zaxis.labelpad = 4
+        axes.tick_params(axis="z", pad=5)
+        axes.zaxis.labelpad = 8
         axes.xaxis.labelpad = axes.yaxis.labelpad = 8
         _fill(axes, limits)
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
@@ -120,9 +125,8 @@ def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
     """Start and end of the motion, and the way of the centres of mass."""
     axes = make_axes(figure, place, drawing, view)
     n_b = len(drawing.lines)
-    colors = colors_of(n_b)
     for k in range(n_b) if n_b <= 3 else [n_b - 1]:
-        axes.plot(*drawing.centres[:, k].T, color=colors[k], linewidth=0.6, alpha=0.55, zorder=ABOVE)
+        axes.plot(*drawing.centres[:, k].T, color=color_of_body(k), linewidth=0.8, alpha=0.7, zorder=ABOVE)
     for index, alpha in ((0, 0.3), (-1, 1.0)):
         show(make_artists(axes, drawing, alpha), drawing, index)
     which = "centre" if n_b == 1 else "last centre" if n_b > 3 else "centres"
@@ -130,28 +134,37 @@ def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
 
 
 def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
-    """Shapes, and empty curves for rails, arms, rods, bodies, sliders, centres of mass and contacts, in the order of
-    `_points_at`."""
+    """Shapes, and empty curves in the order of `_points_at`."""
+    scenes = [Scene(drawing.solids, drawing.axes, drawing.up, alpha)] if drawing.solids is not None else []
+    for scene in scenes:
+        axes.add_collection(scene, autolim=False)
+    return [*scenes, *(_sticks(axes, drawing, alpha) if drawing.sticks else ()), *_contacts(axes, drawing, alpha)]
+
+
+def _sticks(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
+    """Curves for rails, arms, rods, bodies, sliders and centres of mass."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
-    colors = colors_of(len(drawing.lines))
+    colors = [color_of_body(k) for k in range(len(drawing.lines))]
     if len(drawing.pivots):
         axes.plot(*drawing.pivots.T, linestyle="", marker="^", color="0.3", markersize=9, zorder=4)
     style = {"alpha": alpha, "solid_capstyle": "round", "solid_joinstyle": "round"}
     width = 4.0 if len(drawing.lines) <= MANY else 2.0
-    scenes = [Scene(drawing.solids, drawing.spatial, alpha)] if drawing.solids is not None else []
-    for scene in scenes:
-        axes.add_collection(scene, autolim=False)
-    return [*scenes,
-            axes.plot(*empty, color="0.6", linestyle=":", linewidth=1.2, alpha=alpha)[0],
+    return [axes.plot(*empty, color="0.6", linestyle=":", linewidth=1.2, alpha=alpha)[0],
             axes.plot(*empty, color="0.4", linewidth=1.0, alpha=alpha)[0],
             axes.plot(*empty, color="0.4", linewidth=0.6 * width, marker="o", markersize=0.8 * width, **style)[0],
             *[axes.plot(*empty, color=c, linewidth=width, marker="o", markersize=width, **style)[0] for c in colors],
             *[axes.plot(*empty, color=colors[k], linestyle="", marker="s", markersize=3.5 * width, alpha=alpha)[0]
               for k in drawing.sliders],
-            axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0],
-            *([axes.plot(*empty, color=FORCE, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0],
-               axes.plot(*empty, color=FORCE, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0]]
-              if drawing.touches.shape[1] else [])]
+            axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0]]
+
+
+def _contacts(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
+    """Curves for arrows of forces, and points where they act."""
+    if not drawing.touches.shape[1]:
+        return []
+    empty: list[list[float]] = [[]] * len(drawing.labels)
+    return [axes.plot(*empty, color=FORCE, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0],
+            axes.plot(*empty, color=FORCE, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0]]
 
 
 def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
@@ -165,8 +178,9 @@ def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
 
 def _points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
     slides = [drawing.lines[k][:, places] for k, places in drawing.sliders.items()]
-    return [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides,
-                                         drawing.centres[:, drawing.bare])] + (
+    sticks = [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides,
+                                           drawing.centres[:, drawing.bare])] if drawing.sticks else []
+    return sticks + (
         [arrows(drawing.touches[index], drawing.pushes[index]), drawing.touches[index]] if drawing.touches.shape[1] else [])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from symdyn.pictures.arrows import arrow_scale, touching
 from symdyn.pictures.jointed import carriers, jointed_skeleton, placed_joints
+from symdyn.pictures.looks import up_of
 from symdyn.pictures.points import points_of
 from symdyn.pictures.skeleton import Skeleton, bare_skeleton, connect, guess_skeleton
 from symdyn.pictures.solids import Solids
@@ -24,13 +25,14 @@ _LEFT_OUT = 1e-9
 class Drawing:
     """A mechanism as lines and shapes over time, in the axes that are shown.
 
-    lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted, and for bodies that have shapes
+    lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted, and for bodies that have shapes of the user's
     arms       from each body's first point to its centre of mass, joined in one line; rails: from slider to slider;
                rods: massless ones between two bodies
     centres    centres of mass (n_t, n_b, 2 or 3); pivots: points that hold the mechanism to the ground, (n, 2 or 3)
     sliders    the bodies that slide, and which points of their lines do; labels: of the axes
     solids     shapes, if there are any; bare: the bodies without
     touches    where contacts touch, (n_t, n_c, 2 or 3), NaN while they do not; pushes: the ends of the arrows of their forces
+    up         the direction that is above
     """
 
     lines: list[np.ndarray]
@@ -45,6 +47,17 @@ class Drawing:
     bare: Sequence[int]
     touches: np.ndarray
     pushes: np.ndarray
+    up: tuple[float, float, float]
+
+    @property
+    def sticks(self) -> bool:
+        """Whether lines are drawn: joints that are not listed have no look of their own."""
+        return self.solids is None or self.solids.forms is None
+
+    @property
+    def axes(self) -> list[int]:
+        """Which axes of the n-frame are shown."""
+        return ["xyz".index(label) for label in self.labels]
 
     @property
     def spatial(self) -> bool:
@@ -69,10 +82,11 @@ class Drawing:
         touches, forces = touching(solution)
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
                                      touches.reshape(-1, 3), skeleton.pivots,
-                                     solids.reach() if solids is not None else np.zeros((0, 3))])
+                                     solids.reach() if solids is not None and solids.own else np.zeros((0, 3))])
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
         shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
-        if solids is not None:
+        # What moves in a plane is seen from the front.
+        if solids is not None and (solids.own or len(shown) != 2 or solution.module.metadata.planar):
             shown = [0, 1] if solution.module.metadata.planar else [0, 1, 2]
         if not shown:
             return None
@@ -81,8 +95,9 @@ class Drawing:
         arms, rails, rods, centres, pivots, touches, forces, *lines = [points[..., shown] for points in (
             skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, touches, forces, *skeleton.lines)]
         pushes = touches + forces * arrow_scale(forces, float(ranges.max()))
+        about = solution.module.metadata
         return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare, touches,
-                   pushes)
+                   pushes, up_of(about.down, about.planar))
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""
@@ -94,14 +109,14 @@ class Drawing:
             points[a] * (1 - w) + points[b] * w for points in
             (self.arms, self.rails, self.rods, self.centres, self.touches, self.pushes, *self.lines)]
         return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels,
-                       None if self.solids is None else self.solids.at(t, times), self.bare, touches, pushes)
+                       None if self.solids is None else self.solids.at(t, times), self.bare, touches, pushes, self.up)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""
         reach = self.solids.reach() if self.solids is not None else np.zeros((0, 3))
         points = np.concatenate([*[line.reshape(-1, len(self.labels)) for line in self.lines], self.pivots,
                                  *[part.reshape(-1, len(self.labels)) for part in (self.touches, self.pushes)],
-                                 self.centres.reshape(-1, len(self.labels)), reach[:, :len(self.labels)]])
+                                 self.centres.reshape(-1, len(self.labels)), reach[:, self.axes]])
         low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
         longest = (high - low).max()
         half = np.maximum((high - low) / 2, 0.15 * longest) + 0.06 * longest

@@ -14,6 +14,8 @@ Color = tuple[float, float, float]
 _ROUND, _FLAT = 20, 10
 # Stations of a shape that bends.
 _BENDING = 13
+# Width of a beam without a shape, of the mechanism's length.
+_BEAM = 0.03
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None 
     """The pieces of a shape; to: the body where a line ends; bends: with stations enough to bend."""
     values = {name: np.array(rows, dtype=float) for name, rows in record["values"].items()}
     if record["kind"] == "box":
-        yield from _box(body, color, values["size"][0], values["center"][0], values["hole"][0] if "hole" in values else None)
+        yield from box(body, color, values["size"][0], values["center"][0], values["hole"][0] if "hole" in values else None)
     elif record["kind"] == "sweep":
         points, widths = values["points"], values["widths"]
         if bends:
@@ -61,8 +63,9 @@ def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None 
         yield line(body, color, np.vstack([points, *values.get("end", ())]), float(record["width"]), to)
 
 
-def sweep(body: int, color: Color, points: np.ndarray, widths: np.ndarray, direction: np.ndarray | None = None) -> Part:
-    """Elliptic sections along points (n, 3), widths (n, 2) across: the first along a direction."""
+def sweep(body: int, color: Color, points: np.ndarray, widths: np.ndarray, direction: np.ndarray | None = None,
+          around: int = _ROUND) -> Part:
+    """Elliptic sections along points (n, 3), widths (n, 2) across: the first along a direction; corners around each."""
     along = points[-1] - points[0]
     along = along / np.linalg.norm(along)
     for given in (*(() if direction is None else (direction,)), np.eye(3)[np.abs(along).argmin()]):
@@ -72,7 +75,7 @@ def sweep(body: int, color: Color, points: np.ndarray, widths: np.ndarray, direc
             break
     first = first / np.linalg.norm(first)
     second = np.cross(along, first)
-    sides = _ROUND if direction is None else _FLAT
+    sides = around if direction is None else _FLAT
     angles = 2 * np.pi * np.arange(sides) / sides
     rings = (points[:, None] + widths[:, :1, None] / 2 * np.cos(angles)[None, :, None] * first
              + widths[:, 1:, None] / 2 * np.sin(angles)[None, :, None] * second)
@@ -84,6 +87,11 @@ def sweep(body: int, color: Color, points: np.ndarray, widths: np.ndarray, direc
     faces = [[at(k, j), at(k, j + 1), at(k + 1, j + 1), at(k + 1, j)] for k in range(count - 1) for j in range(sides)]
     ends = [[at(0, -j) for j in range(sides)], [at(count - 1, j) for j in range(sides)]]
     return _part(body, color, vertices, [*faces, *ends], (), np.repeat(points, sides, axis=0), lambda face: face >= len(faces))
+
+
+def beam(body: int, color: Color, points: np.ndarray, length: float) -> Part:
+    """A bar through the points of what bends; length of the mechanism, m."""
+    return sweep(body, color, points, np.full((len(points), 2), _BEAM * length))
 
 
 def line(body: int, color: Color, points: np.ndarray, width: float, to: int | None = None) -> Part:
@@ -103,7 +111,7 @@ def _triangles(body: int, color: Color, vertices: np.ndarray, faces: np.ndarray)
                 np.zeros(0, dtype=bool), convex=False)
 
 
-def _box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np.ndarray | None) -> Iterator[Part]:
+def box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np.ndarray | None = None) -> Iterator[Part]:
     """A box; one with an opening is four around it, without edges where they touch."""
     reach = [[c - s / 2, c + s / 2] for c, s in zip(center, size, strict=True)]
     if hole is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,6 @@ from matplotlib.collections import PolyCollection
 from symdyn.pictures.painter import Camera, cut, order, planes
 from symdyn.pictures.solids import Solids, Water
 
-# A plane system is seen along -z.
-_FROM_ABOVE = Camera(np.eye(4), np.array([0.0, 0.0, 1.0, 0.0]))
 _WATER_ALPHA = 0.38
 # Of a colour: what is left in the shade, and along edges.
 _SHADE, _EDGE = 0.5, 0.6
@@ -21,11 +20,16 @@ class Scene(PolyCollection):
     """Shapes at one time as polygons of the screen, in the order in which they hide each other.
 
     Polygons are made again whenever the axes are drawn: they follow the eye.
+
+    shown   axes of the n-frame that the picture has; of two the first is to the right, the second up, and the eye is far away
+    up      what is above, in the n-frame; an axis against it is turned over
     """
 
-    def __init__(self, solids: Solids, spatial: bool, alpha: float = 1.0) -> None:
+    def __init__(self, solids: Solids, shown: Sequence[int], up: Sequence[float] = (0.0, 0.0, 1.0), alpha: float = 1.0) -> None:
         super().__init__([], closed=True)
-        self._solids, self._spatial, self._opacity = solids, spatial, alpha
+        self._solids, self._opacity, self._spatial = solids, alpha, len(shown) == 3
+        self._up = np.array(up)
+        self._flat = _facing(shown[0], shown[1], self._up) if len(shown) == 2 else None
         self._places = solids.vertices(0)
         self.set_in_layout(False)
         self.set_capstyle("round")
@@ -39,7 +43,7 @@ class Scene(PolyCollection):
     def do_3d_projection(self) -> float:
         """Make the polygons; axes of space call it before they draw."""
         axes: Any = self.axes
-        self._paint(Camera.of(axes.get_proj()) if self._spatial else _FROM_ABOVE)
+        self._paint(self._flat or Camera.of(axes.get_proj()))
         return 0.0
 
     def draw(self, renderer: Any) -> None:
@@ -51,7 +55,7 @@ class Scene(PolyCollection):
         water = self._solids.water if self._spatial else None
         level = water.level if water is not None else -np.inf
         low, high = _Pieces(self._opacity), _Pieces(self._opacity)
-        light = _light(camera.toward(np.concatenate(self._places).mean(axis=0))) if self._places else np.zeros(3)
+        light = _light(camera.toward(np.concatenate(self._places).mean(axis=0)), self._up) if self._places else np.zeros(3)
         for k in order(self._solids.parts, self._places, camera):
             part, places = self._solids.parts[k], self._places[k]
             normals, offsets = planes(places, part.corners)
@@ -95,6 +99,14 @@ class Scene(PolyCollection):
         return np.array([[x0, y0, water.level], [x1, y0, water.level], [x1, y1, water.level], [x0, y1, water.level]])
 
 
+def _facing(right: int, upward: int, up: np.ndarray) -> Camera:
+    """The camera that looks at a plane of two axes, the second of which may point down."""
+    matrix = np.eye(4)
+    x, y = np.eye(3)[right], np.eye(3)[upward]
+    matrix[:3, :3] = [x, y, np.cross(x, y)]
+    return Camera(matrix, np.append(np.cross(x, y if up[upward] >= 0 else -y), 0.0))
+
+
 class _Pieces:
     """Polygons of the screen with their colours and the widths of their edges."""
 
@@ -110,9 +122,9 @@ class _Pieces:
         self.widths.append(width)
 
 
-def _light(toward: np.ndarray) -> np.ndarray:
+def _light(toward: np.ndarray, up: np.ndarray) -> np.ndarray:
     """Unit vector to the light: above the eye, on its left."""
-    right = np.cross([0.0, 0.0, 1.0], toward)
+    right = np.cross(up, toward)
     length = float(np.linalg.norm(right))
     right = right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
     light = toward - 0.6 * right + 0.8 * np.cross(toward, right)

@@ -11,8 +11,10 @@ from matplotlib.colors import to_rgb
 
 from symdyn.errors import ArgumentError
 from symdyn.pictures.bending import Bending, bendings
-from symdyn.pictures.meshes import Part, line, parts_of
-from symdyn.pictures.style import colors_of
+from symdyn.pictures.forms import Forms
+from symdyn.pictures.looks import color_of_body
+from symdyn.pictures.mechanism import mechanism_of
+from symdyn.pictures.meshes import Part, beam, parts_of
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -37,16 +39,22 @@ class Water:
 class Solids:
     """Shapes of bodies over time.
 
-    parts       in body axes; origins (n_t, n_b + 1, 3) and rotations (n_t, n_b + 1, 3, 3), the last the ground's
-    bending     of each part, if it bends; bodies: those that have shapes
+    own         of shapes of the user's and of what bends, in body axes; bending: of each of these, if it bends
+    forms       what bodies, joints and springs look like by themselves; None where joints are not listed
+    origins     (n_t, n_b + 1, 3) and rotations (n_t, n_b + 1, 3, 3), the last the ground's; bodies: those that have shapes
     """
 
-    parts: Sequence[Part]
+    own: Sequence[Part]
     bending: Sequence[Bending | None]
+    forms: Forms | None
     water: Water | None
     origins: np.ndarray
     rotations: np.ndarray
     bodies: frozenset[int]
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        return [*self.own, *(form.part for form in (self.forms.forms if self.forms is not None else ()))]
 
     @classmethod
     def of(cls, solution: Solution) -> Solids | None:
@@ -54,15 +62,18 @@ class Solids:
         module = solution.module
         records = module.metadata.drawn
         bent = bendings(solution)
-        if not (records or bent) or "frames" not in module.functions or not len(solution.t):
+        jointed = "joint_points" in module.functions
+        if not (records or bent or jointed) or "frames" not in module.functions or not len(solution.t):
             return None
         frames = solution.rows("frames").reshape(len(solution.t), -1, 12)
         if not np.isfinite(frames).all():
             return None
+        forms = Forms.of(mechanism_of(solution, frames, int(solution.t.argmin()))) if jointed else None
+        length = forms.length if forms is not None else float(np.ptp(frames[..., :3], axis=(0, 1)).max(initial=0.0))
         still = np.concatenate([np.zeros(3), np.eye(3).ravel()])
         frames = np.concatenate([frames, np.broadcast_to(still, (len(frames), 1, 12))], axis=1)
         names = [*module.metadata.bodies, "ground"]
-        own = [*colors_of(len(names) - 1), _GROUND_COLOR]
+        colors = [*(to_rgb(color_of_body(k)) for k in range(len(names) - 1)), _GROUND_COLOR]
         parts, bending, water = [], [], None
         for record in filled(records, lengths_of(solution)):
             body = names.index(record["body"])
@@ -70,16 +81,17 @@ class Solids:
                 water = water_of(record, module.name)
                 continue
             to = names.index(record["to"]) if record.get("to") is not None else None
-            color = to_rgb(own[body]) if record["color"] is None else color_of(record["color"], module.name)
+            color = colors[body] if record["color"] is None else color_of(record["color"], module.name)
             made = list(parts_of(record, body, color, to, body in bent))
             parts += made
             bending += [bent[body].of(part) if body in bent and part.to is None else None for part in made]
         for body in bent:
             if not any(part.body == body for part in parts):
-                parts.append(line(body, to_rgb(own[body]), bent[body].points, 3.0))
+                parts.append(beam(body, colors[body], bent[body].points, length))
                 bending.append(bent[body].of(parts[-1]))
         bodies = {part.body for part in parts}
-        return cls(parts, bending, water, frames[..., :3], frames[..., 3:].reshape(*frames.shape[:2], 3, 3), frozenset(bodies))
+        rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)
+        return cls(parts, bending, forms, water, frames[..., :3], rotations, frozenset(bodies))
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Solids:
         """The shapes at other times: origins between those of the two nearest times, rotations on the shortest way."""
@@ -94,13 +106,13 @@ class Solids:
     def vertices(self, index: int) -> list[np.ndarray]:
         """The vertices of every part at one of the times, (n, 3) each, n-frame."""
         found = []
-        for part, bending in zip(self.parts, self.bending, strict=True):
+        for part, bending in zip(self.own, self.bending, strict=True):
             own = part.vertices if bending is None else part.vertices + bending.displacements(index)
             placed = self.origins[index, part.body] + own @ self.rotations[index, part.body].T
             if part.to is not None:
                 placed[-1] = self.origins[index, part.to] + self.rotations[index, part.to] @ part.vertices[-1]
             found.append(placed)
-        return found
+        return found if self.forms is None else found + self.forms.vertices(self.origins[index], self.rotations[index])
 
     def reach(self) -> np.ndarray:
         """Points that the picture must show, (n, 3)."""

@@ -37,14 +37,14 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
                             "that extend or move")
     times, views = _pictures(solution, t, view)
     there = drawing.at(solution.t, times) if len(solution.t) > 1 else drawing
-    spans = np.ptp(drawing.limits(), axis=1)
+    spans = np.ptp(there.limits(), axis=1)
     columns = min(len(times), _COLUMNS)
     rows = -(-len(times) // columns)
     height = _SIDE if drawing.spatial else _SIDE * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.4
     figure = Picture(figsize=(_SIDE * columns, height * rows), layout=None if drawing.spatial else "constrained")
     grid = figure.add_gridspec(rows, columns)
     for k, (time, eye) in enumerate(zip(times, views, strict=True)):
-        axes = make_axes(figure, grid[divmod(k, columns)], drawing, eye)
+        axes = make_axes(figure, grid[divmod(k, columns)], there, eye)
         show(make_artists(axes, there), there, k if len(solution.t) > 1 else 0)
         title(axes, f"t = {time:.5g} s", 10)
     if drawing.spatial:

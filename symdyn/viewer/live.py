@@ -16,8 +16,8 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.jointed import carriers
+from symdyn.pictures.looks import Mechanism
 from symdyn.tape.floats import evaluate_rows
-from symdyn.viewer.looks import Mechanism
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
 

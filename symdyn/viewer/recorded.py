@@ -9,13 +9,11 @@ import numpy as np
 from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
 from symdyn.pictures.bending import bendings
-from symdyn.pictures.jointed import carriers
+from symdyn.pictures.mechanism import Hung, mechanism_of
 from symdyn.pictures.panels import panels_of
-from symdyn.pictures.points import points_of
 from symdyn.pictures.solids import lengths_of
 from symdyn.shown import shown
 from symdyn.viewer.arrays import packed
-from symdyn.viewer.looks import GROUND, Mechanism
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
 
@@ -56,14 +54,15 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
         raise ArgumentError(f"{name}: positions of bodies are not finite at t = {solution.t[first]:.6g} s; end the motion "
                             "before it")
     order = np.argsort(solution.t, kind="stable")
+    mechanism = mechanism_of(solution, frames, int(order[0]))
     frames, t = frames[order], solution.t[order]
-    mechanism = _mechanism(solution, frames, order)
+    hung = Hung.of(mechanism)
     scene = scene_of(mechanism, about.drawn, lengths_of(solution), bendings(solution), name)
     rows = _rows(t, frames, scene["length"])
     chosen = frames[rows]
     scene |= {"kind": "recorded", "name": name, "t": packed(t[rows]), "origins": packed(chosen[..., :3].reshape(len(rows), -1)),
               "turns": packed(_quaternions(chosen[..., 3:].reshape(len(rows), n_b, 3, 3)).reshape(len(rows), -1)),
-              "points": _locals(mechanism), "axes": _axes(mechanism), "success": bool(solution.success),
+              "points": _locals(hung), "axes": _axes(hung), "success": bool(solution.success),
               "message": str(solution.message), "panels": _panels(solution, order)}
     eta = list(dict.fromkeys(c for record in about.flexible for c in record["coordinates"]))
     if eta:
@@ -75,48 +74,18 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     return scene
 
 
-def _mechanism(solution: Solution, frames: np.ndarray, order: np.ndarray) -> Mechanism:
-    """The mechanism at the start of the motion."""
-    module, about = solution.module, solution.module.metadata
-    first, n_b = int(order[0]), len(about.bodies)
-
-    def at(name: str, columns: int) -> np.ndarray:
-        if name not in module.functions:
-            return np.zeros((0, columns))
-        found = module.evaluate(name, solution.t[first], solution.x[first], solution.params, solution.inputs[first])
-        return np.asarray(found, dtype=float).reshape(-1, columns)
-
-    points = at("joint_points", 6)
-    names = list(zip(about.reactions, about.reaction_bodies, about.reaction_kinds, strict=True)) if len(points) else []
-    inertia = at("inertial_parameters", 10)
-    drawn = {about.bodies.index(r["body"]) for r in about.drawn if r.get("body") in about.bodies}
-    drawn |= {about.bodies.index(r[end]) for r in about.flexible for end in ("body", "tip") if r[end] in about.bodies}
-    drawn |= carriers(about.bodies, about.reactions, about.reaction_bodies)
-    tips = []
-    for output, point in points_of(solution).items():
-        if point.quantity == "position":
-            given = np.pad(solution.outputs[output][first], (0, 3 - solution.outputs[output].shape[1]))
-            R, o = frames[0, point.body, 3:].reshape(3, 3), frames[0, point.body, :3]
-            tips.append((point.body, R.T @ (given - o)))
-    return Mechanism(about.bodies, frames[0], at("positions", 3), [(n, *ends, kind) for n, ends, kind in names], points,
-                     at("joint_axes", 3), about.connections, at("spring_points", 6), inertia if len(inertia) == n_b else None,
-                     about.planar, about.down, frozenset(drawn), tips)
-
-
-def _locals(m: Mechanism) -> list[list[float]]:
+def _locals(hung: Hung) -> list[list[float]]:
     """Every point as its body and its place there."""
-    return [[owner, *(float(f"{v:.7g}") for v in m.local(owner, point))] for point, owner in
-            zip(m.points, m.owners(), strict=True)]
+    return [[int(owner), *map(_short, place)] for owner, place in zip(hung.owners, hung.places, strict=True)]
 
 
-def _axes(m: Mechanism) -> list[list[float]]:
+def _axes(hung: Hung) -> list[list[float]]:
     """The axis of every joint in the axes of its parent."""
-    found = []
-    for (_, parent, _, _), axis in zip(m.joints, m.joint_axes, strict=True):
-        body = m.index(parent)
-        own = axis if body == GROUND else m.frames[body, 3:].reshape(3, 3).T @ axis
-        found.append([body, *(float(f"{v:.7g}") for v in own)])
-    return found
+    return [[int(body), *map(_short, axis)] for body, axis in zip(hung.parents, hung.axes, strict=False)]
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.7g}")
 
 
 def _rows(t: np.ndarray, frames: np.ndarray, length: float) -> np.ndarray:

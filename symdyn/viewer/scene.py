@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from symdyn.pictures.bending import Bending
-from symdyn.pictures.meshes import Part, parts_of, sweep
+from symdyn.pictures.looks import PALETTE, Item, Mechanism, color_of_body, looks_of
+from symdyn.pictures.meshes import Part, beam, parts_of
 from symdyn.pictures.solids import Water, color_of, filled, water_of
 from symdyn.viewer.arrays import plain, text_of
-from symdyn.viewer.looks import PALETTE, Item, Mechanism, looks_of
 
 _GROUND_COLOR = "#9ca3af"
 # Of the mechanism's length: the radius of a line a point of print wide.
@@ -46,9 +46,8 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
     drawn = {mesh["body"] for mesh in meshes}
     for body, bending in bent.items():
         if body not in drawn:
-            widths = np.full((len(bending.points), 2), 0.03 * length)
-            part = sweep(body, (0.0, 0.0, 0.0), bending.points, widths)
-            meshes.append(_mesh(part, m, PALETTE[body % len(PALETTE)], bending, length))
+            part = beam(body, (0.0, 0.0, 0.0), bending.points, length)
+            meshes.append(_mesh(part, m, color_of_body(body), bending, length))
     return {"bodies": list(m.bodies), "planar": m.planar,
             "length": length, "up": list(m.up), "items": [*map(_plain, items), *threads],
             "meshes": meshes, "water": water, "palette": list(PALETTE), "joints": [list(j) for j in m.joints],

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 from scipy.spatial import ConvexHull
 
+from symdyn.pictures.looks import GROUND, PALETTE, Item, Mechanism, looks_of
 from symdyn.pictures.meshes import parts_of
 from symdyn.pictures.solids import color_of, filled
-from symdyn.viewer.looks import GROUND, PALETTE, Item, Mechanism, looks_of
 
 _WIDE, _HIGH, _MARGIN = 260, 200, 12
 # The camera of the page: azimuth and elevation.

@@ -402,7 +402,7 @@ def test_a_film_runs_backwards_with_its_motion() -> None:
     whole = Drawing.of(solution)
     assert film.count == 11 and whole is not None
     film.place(10)
-    there = np.array(film.figure.axes[0].lines[-1].get_data())[:, 0]
+    there = np.array(film.figure.axes[0].lines[0].get_data())[:, -1]
     assert np.allclose(there, whole.centres[-1, -1], atol=1e-6)
 
 

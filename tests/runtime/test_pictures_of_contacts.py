@@ -8,6 +8,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.pictures import arrows
+from symdyn.pictures.bodies import FORCE
 from symdyn.pictures.drawing import Drawing
 
 G = 9.81
@@ -59,7 +60,7 @@ def test_plots_mark_changes_of_modes_and_films_have_arrows(landing: Any, tmp_pat
     marks = {float(np.asarray(line.get_xdata())[0]) for line in figure.axes[0].lines if line.get_linestyle() == ":"}
     assert {lands, rests} <= marks
     shown = landing.picture(1.0).axes[0]
-    curves = [line for line in shown.lines if line.get_color() == "tab:red"]
+    curves = [line for line in shown.lines if line.get_color() == FORCE]
     assert len(curves) == 2 and np.asarray(curves[1].get_xdata()) == pytest.approx(landing["x"][-1] + np.array([-0.2, 0.2]))
     landing.animate(tmp_path / "film.gif", fps=5)
     assert (tmp_path / "film.gif").stat().st_size > 0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.pictures.looks import PALETTE, Item, Mechanism, looks_of
 from symdyn.viewer.live import mechanism_of
-from symdyn.viewer.looks import PALETTE, Item, Mechanism, looks_of
 
 
 def looks(system: sd.System) -> tuple[list[Item], Mechanism, float]:

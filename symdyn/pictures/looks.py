@@ -22,6 +22,8 @@ _SLIDING = ("prismatic", "cylindrical", "helical")
 _SAME, _EXTENT = 1e-6, 0.02
 # Radius of a link, of the mechanism's length.
 _RADIUS = 0.02
+# Half the length of a rail on which nothing has moved, of the mechanism's length.
+_RAIL = 0.5
 
 # A point by its index, a point of a body (body, x, y, z), ("off", point, axis, distance), or ("foot", a, b, axis): the point
 # of the axis through a that is nearest to b.
@@ -38,6 +40,7 @@ class Mechanism:
     inertia       (n_b, 10): m, m c, moments about the origin (xx xy xz yy yz zz), body axes; None where not known
     down          direction of gravity, zero where there is none
     tips          further points that bodies reach to: body, (3,) in its axes
+    travels       how far joints slide along their axes in a motion: least and most, m; () where it is not known
     """
 
     bodies: Sequence[str]
@@ -53,6 +56,7 @@ class Mechanism:
     down: tuple[float, float, float]
     drawn: frozenset[int] = frozenset()
     tips: Sequence[tuple[int, np.ndarray]] = ()
+    travels: Sequence[tuple[float, float]] = ()
 
     @property
     def points(self) -> np.ndarray:
@@ -62,12 +66,7 @@ class Mechanism:
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """What is above in the picture: the coordinate axis against gravity, else y in a plane and z in space."""
-        k = int(np.abs(self.down).argmax())
-        if abs(self.down[k]) < 0.99 or (self.planar and k == 2):
-            return (0.0, 1.0, 0.0) if self.planar else (0.0, 0.0, 1.0)
-        x, y, z = (-float(np.sign(v)) if i == k else 0.0 for i, v in enumerate(self.down))
-        return x, y, z
+        return up_of(self.down, self.planar)
 
     def owners(self) -> list[int]:
         """The body that each of the points is fixed to."""
@@ -109,6 +108,15 @@ class Mechanism:
         xx, xy, xz, yy, yz, zz = self.inertia[body, 4:]
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / m - (c @ c * np.eye(3) - np.outer(c, c))
         return m, np.where(np.abs(about) > 1e-12 * max(c @ c, 1e-300), about, 0.0)
+
+
+def up_of(down: Sequence[float], planar: bool) -> tuple[float, float, float]:
+    """What is above in the picture: the coordinate axis against gravity, else y in a plane and z in space."""
+    k = int(np.abs(down).argmax())
+    if abs(down[k]) < 0.99 or (planar and k == 2):
+        return (0.0, 1.0, 0.0) if planar else (0.0, 0.0, 1.0)
+    x, y, z = (-float(np.sign(v)) if i == k else 0.0 for i, v in enumerate(down))
+    return x, y, z
 
 
 @dataclass(frozen=True)
@@ -154,7 +162,8 @@ def _length(m: Mechanism) -> float:
     return found if np.isfinite(found) and found > 0 else 1.0
 
 
-def _color(body: int) -> str:
+def color_of_body(body: int) -> str:
+    """Of its index, or of the ground."""
     return METAL if body == GROUND else PALETTE[body % len(PALETTE)]
 
 
@@ -170,9 +179,10 @@ def _joints(m: Mechanism, r: float, length: float) -> Iterator[Item]:
             yield Item("rod", (2 * j, 2 * j + 1), (0.6 * r, 0.6 * r), METAL, title)
             continue
         if kind in _SLIDING:
-            yield replace(own, kind="block", size=(2.2 * r, 2.2 * r, 3.2 * r), color=_color(ends[1]))
-            far = 0.6 * length
-            rail = ((("off", 2 * j, j, -far), ("off", 2 * j, j, far)) if GROUND in ends else (2 * j, 2 * j + 1))
+            yield replace(own, kind="block", size=(2.2 * r, 2.2 * r, 3.2 * r), color=color_of_body(ends[1]))
+            least, most = m.travels[j] if m.travels else (-_RAIL * length, _RAIL * length)
+            rail = ((("off", 2 * j, j, least - 6 * r), ("off", 2 * j, j, most + 6 * r)) if GROUND in ends
+                    else (2 * j, 2 * j + 1))
             yield Item("rod", rail, (0.5 * r, 0.5 * r), STEEL, title)
             continue
         yield replace(own, kind="pin", size=(1.5 * r, 1.9 * r)) if np.any(m.joint_axes[j]) else replace(
@@ -191,7 +201,7 @@ def _springs(m: Mechanism, r: float) -> Iterator[Item]:
 
 def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
     """A body as rods between its points, or as a solid of its inertia where it has no extent."""
-    color, name = _color(body), m.bodies[body]
+    color, name = color_of_body(body), m.bodies[body]
     mass, moments = m.moments(body)
     held = _attached(m, body, length)
     centre = m.centre(body)
@@ -306,5 +316,5 @@ def _on_request(m: Mechanism, body: int, r: float, length: float) -> Iterator[It
     if mass and np.trace(moments) > (_EXTENT * length) ** 2:
         semi, axes = _principal(moments, 5.0)
         size = tuple(float(max(s, 0.2 * r)) for s in semi)
-        yield Item("ellipsoid", (centre,), size, _color(body), f"inertia of {m.bodies[body]}", turn=tuple(axes.ravel()),
+        yield Item("ellipsoid", (centre,), size, color_of_body(body), f"inertia of {m.bodies[body]}", turn=tuple(axes.ravel()),
                    layer="inertia")

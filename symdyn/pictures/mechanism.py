@@ -1,0 +1,111 @@
+"""The mechanism of a motion as what is drawn hangs on: its points on their bodies, and the axes of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symdyn.pictures.jointed import carriers
+from symdyn.pictures.looks import GROUND, Mechanism, Ref
+from symdyn.pictures.points import points_of
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+
+@dataclass(frozen=True)
+class Hung:
+    """Points and axes by the body that each is fixed to.
+
+    owners   of the points (n_p,), places (n_p, 3) in the axes of these; parents of the joints (n_j,), axes (n_j, 3) in theirs
+    """
+
+    owners: np.ndarray
+    places: np.ndarray
+    parents: np.ndarray
+    axes: np.ndarray
+
+    @classmethod
+    def of(cls, m: Mechanism) -> Hung:
+        owners = np.array(m.owners(), dtype=int)
+        places = np.array([m.local(owner, point) for owner, point in zip(owners, m.points, strict=True)]).reshape(-1, 3)
+        parents = np.array([m.index(parent) for _, parent, _, _ in m.joints], dtype=int)
+        axes = [axis if body == GROUND else m.frames[body, 3:].reshape(3, 3).T @ axis
+                for body, axis in zip(parents, m.joint_axes, strict=False)]
+        return cls(owners, places, parents, np.array(axes).reshape(-1, 3))
+
+    def at(self, origins: np.ndarray, rotations: np.ndarray) -> Posed:
+        """Where all is at one time; origins (n_b + 1, 3) and rotations (n_b + 1, 3, 3), the last the ground's."""
+        points = origins[self.owners] + np.einsum("nij,nj->ni", rotations[self.owners], self.places)
+        return Posed(points, np.einsum("nij,nj->ni", rotations[self.parents], self.axes), origins, rotations)
+
+
+@dataclass(frozen=True)
+class Posed:
+    """Points (n_p, 3) and axes of joints (n_j, 3) at one time, n-frame, with the frames of bodies, the last the ground's."""
+
+    points: np.ndarray
+    axes: np.ndarray
+    origins: np.ndarray
+    rotations: np.ndarray
+
+    def at(self, ref: Ref) -> np.ndarray:
+        """The point that is referred to, see `looks.Ref`."""
+        if isinstance(ref, int):
+            return np.asarray(self.points[ref])
+        if ref[0] == "off":
+            return np.asarray(self.at(ref[1]) + ref[3] * self.axes[ref[2]])
+        if ref[0] == "foot":
+            a, n = self.at(ref[1]), self.axes[ref[3]]
+            return np.asarray(a + n * (n @ (self.at(ref[2]) - a)))
+        body, *place = ref
+        return np.asarray(self.origins[body] + self.rotations[body] @ place)
+
+
+def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanism:
+    """The mechanism at the start of a motion.
+
+    frames   of the bodies at every time, (n_t, n_b, 12), n-frame; first: the row of the solution that is its start
+    """
+    module, about = solution.module, solution.module.metadata
+
+    def at(name: str, columns: int) -> np.ndarray:
+        if name not in module.functions:
+            return np.zeros((0, columns))
+        found = module.evaluate(name, solution.t[first], solution.x[first], solution.params, solution.inputs[first])
+        return np.asarray(found, dtype=float).reshape(-1, columns)
+
+    points = at("joint_points", 6)
+    names = list(zip(about.reactions, about.reaction_bodies, about.reaction_kinds, strict=True)) if len(points) else []
+    inertia = at("inertial_parameters", 10)
+    drawn = {about.bodies.index(r["body"]) for r in about.drawn if r.get("body") in about.bodies}
+    drawn |= {about.bodies.index(r[end]) for r in about.flexible for end in ("body", "tip") if r[end] in about.bodies}
+    drawn |= carriers(about.bodies, about.reactions, about.reaction_bodies)
+    start = frames[first]
+    tips = []
+    for output, point in points_of(solution).items():
+        if point.quantity == "position":
+            given = np.pad(solution.outputs[output][first], (0, 3 - solution.outputs[output].shape[1]))
+            R, o = start[point.body, 3:].reshape(3, 3), start[point.body, :3]
+            tips.append((point.body, R.T @ (given - o)))
+    found = Mechanism(about.bodies, start, at("positions", 3), [(n, *ends, kind) for n, ends, kind in names], points,
+                      at("joint_axes", 3), about.connections, at("spring_points", 6),
+                      inertia if len(inertia) == len(start) else None, about.planar, about.down, frozenset(drawn), tips)
+    return replace(found, travels=_travels(found, frames))
+
+
+def _travels(m: Mechanism, frames: np.ndarray) -> Sequence[tuple[float, float]]:
+    """How far the child of every joint gets along its axis: least and most, m."""
+    hung = Hung.of(m)
+    still = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel()]), (len(frames), 1, 12))
+    frames = np.concatenate([frames, still], axis=1)
+    rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)
+    found = []
+    for j in range(len(m.joints)):
+        a, b = (frames[:, hung.owners[p], :3] + rotations[:, hung.owners[p]] @ hung.places[p] for p in (2 * j, 2 * j + 1))
+        way = np.einsum("ti,ti->t", b - a, rotations[:, hung.parents[j]] @ hung.axes[j])
+        found.append((float(way.min()), float(way.max())))
+    return found

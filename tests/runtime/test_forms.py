@@ -1,0 +1,119 @@
+"""Pictures and films show bodies, joints and springs as the solids of the page, where the equations say that they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.runtime.solutions.solution import Solution
+
+pytest.importorskip("matplotlib")
+
+from symdyn.pictures.animation import animate
+from symdyn.pictures.bodies import flat, make_axes
+from symdyn.pictures.drawing import Drawing
+from symdyn.pictures.figure import Picture
+from symdyn.pictures.forms import Form
+from symdyn.pictures.looks import STEEL
+from symdyn.pictures.scene import Scene
+from symdyn.pictures.solids import Solids
+
+
+@pytest.fixture(scope="module")
+def loop() -> Solution:
+    return sd.systems.four_bar().augmented().compile("numpy").simulate((0.0, 0.5))
+
+
+@pytest.fixture(scope="module")
+def cart() -> Solution:
+    return sd.systems.cart_pole().compile(backend="numpy").simulate((0.0, 1.0), inputs={"F": 6.0})
+
+
+def placed(solution: Solution, index: int) -> list[tuple[Form, np.ndarray]]:
+    solids = Solids.of(solution)
+    assert solids is not None and solids.forms is not None
+    return list(zip(solids.forms.forms, solids.vertices(index), strict=True))
+
+
+@pytest.mark.parametrize("index", [0, 250, 500])
+def test_pins_are_where_joints_are_and_links_go_between_them(loop: Solution, index: int) -> None:
+    joints = loop.rows("joint_points").reshape(len(loop.t), -1, 6)[index, :, 3:]
+    found = placed(loop, index)
+    pins = np.array([places.mean(axis=0) for form, places in found if form.item.kind == "pin"])
+    assert pins.shape == joints.shape and np.abs(pins - joints).max() < 1e-6
+    rods = [places for form, places in found if form.item.kind == "rod"]
+    assert len(rods) == 3
+    for places in rods:
+        for end in (places[:16].mean(axis=0), places[16:].mean(axis=0)):
+            assert np.linalg.norm(joints - end, axis=1).min() < 1e-5
+
+
+def test_rails_reach_as_far_as_what_slides_on_them(cart: Solution) -> None:
+    (block,) = [places for form, places in placed(cart, 0) if form.item.kind == "block"]
+    (rail,) = [places for form, places in placed(cart, 0) if form.item.color == STEEL]
+    x, half = cart["q1"], np.ptp(block[:, 0]) / 2
+    assert x.max() - x.min() > 1
+    assert rail[:, 0].min() < x.min() - half and rail[:, 0].max() > x.max() + half
+    assert rail[:, 0].max() < x.max() + 4 * half
+
+
+def test_springs_follow_their_ends() -> None:
+    solution = sd.systems.car_axis().augmented().compile("numpy").simulate((0.0, 0.2))
+    ends = solution.rows("spring_points").reshape(len(solution.t), -1, 2, 3)[-1]
+    coils = [places for form, places in placed(solution, -1) if form.item.kind in ("spring", "both") and not form.part.faces]
+    assert len(coils) == len(ends) == 2
+    assert np.allclose([(places[0], places[-1]) for places in coils], ends)
+
+
+def test_what_moves_in_a_plane_of_space_is_seen_from_the_front() -> None:
+    """A pendulum in the x-z plane of a system in space: x to the right and z up, its solids nearer to the eye hide the others."""
+    system = sd.System("swing", gravity=[0, 0, -9.81])
+    bob = system.add_body("bob", mass=1, com=[0, 0, -1])
+    system.add_joint(sd.Revolute("pin", system.ground, bob, sd.coordinates("q"), axis=[0, 1, 0]))
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.5), q=[0.5])
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.labels == ["x", "z"] and drawing.solids is not None
+    scene = Scene(drawing.solids, drawing.axes, drawing.up)
+    assert scene._flat is not None and np.allclose(scene._flat.eye, [0, -1, 0, 0])
+    assert np.allclose(scene._flat.project(np.array([[1.0, 2.0, 3.0]])), [[1.0, 3.0]])
+
+
+def test_an_axis_that_points_down_is_turned_over_and_nothing_is_mirrored() -> None:
+    solution = sd.systems.bicycle().augmented().compile("numpy").simulate((0.0, 0.05))
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.up == (0.0, 0.0, -1.0)
+    axes = make_axes(Picture(), 111, drawing)
+    middle = drawing.limits().mean(axis=1)
+    step = 0.1 * np.eye(3)
+    screen = flat(axes, np.vstack([middle, middle + step]))
+    x, _, z = screen[1:] - screen[0]
+    assert z[1] < 0 and abs(z[0]) < 0.1 * abs(z[1])
+    assert x[0] > 0
+    eye = np.linalg.solve(axes.get_proj(), [0.0, 0.0, -1.0, 0.0])
+    # To the right, up and to the eye are right-handed.
+    assert np.linalg.det(np.array([step[0], -step[2], eye[:3] / eye[3] - middle])) > 0
+
+
+def test_a_body_at_rest_without_extent_is_there() -> None:
+    system = sd.System("hover", gravity=[0, 0, 0])
+    body = system.add_body("frame", mass=1, inertia=[0.01, 0.01, 0.02])
+    system.add_joint(sd.Free("flight", system.ground, body, sd.coordinates("x y z a b c"), orientation=sd.EulerAngles("ZYX")))
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.1))
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.spatial
+    size = np.ptp(drawing.solids.reach(), axis=0) if drawing.solids is not None else np.zeros(3)
+    # The cylinder of the same inertia: m r² / 2 about its axis.
+    assert size[0] == pytest.approx(2 * np.sqrt(2 * 0.02), rel=0.02)
+
+
+def test_films_show_the_same_solids(loop: Solution) -> None:
+    film: Any = animate(loop, fps=4)
+    (scene,) = [artist for artist in film.figure.axes[0].collections if isinstance(artist, Scene)]
+    film.place(1)
+    scene.do_3d_projection()
+    corners = np.concatenate([path.vertices for path in scene.get_paths()])
+    wanted = np.concatenate([places for _, places in placed(loop, int(np.argmin(abs(loop.t - 0.25))))])[:, :2]
+    assert np.allclose([corners.min(axis=0), corners.max(axis=0)], [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-3)
