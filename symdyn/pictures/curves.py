@@ -5,36 +5,35 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm
-from matplotlib.figure import Figure
 
 from symdyn.pictures.panels import Panel
-from symdyn.pictures.style import MANY, colors_of
+from symdyn.pictures.style import SCREEN, Style, colors_of
+from symdyn.pictures.symbols import axis_label, typeset
+
+_ENERGY = ("#D55E00", "#0072B2", "#000000")
 
 
-def draw_panel(figure: Figure, axes: Any, t: np.ndarray, panel: Panel) -> None:
+def draw_panel(axes: Any, t: np.ndarray, panel: Panel, style: Style = SCREEN) -> None:
+    """Curves with their names and unit; the legend stands on the right, on paper above."""
     count = len(panel.names)
-    colors = colors_of(count)
-    energy = panel.title == "energy"
+    colors = _ENERGY if panel.group == "energy" and count == 3 else colors_of(count)
     for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
-        axes.plot(t, values, label=name, linewidth=1.4 if count <= MANY else 0.9, marker="." if len(t) == 1 else None,
-                  color=("tab:red", "tab:blue", "black")[k] if energy else colors[k])
-    label = panel.title if count > 1 else panel.names[0]
-    axes.set_ylabel(f"{label} [{panel.unit}]" if panel.unit else label)
-    axes.grid(True, color="0.9", linewidth=0.7)
+        label = typeset(name if style.beside else name.replace("\n", " "))
+        axes.plot(t, values, label=label, linewidth=style.width, color=colors[k], linestyle=style.dashes[k % len(style.dashes)],
+                  marker="." if len(t) == 1 else None)
+    axes.set_ylabel(axis_label(panel.names, panel.title, panel.unit))
+    axes.grid(True, color="0.9", linewidth=style.grid)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     _show_small(axes, panel.values)
-    if count > MANY:
-        scale = ScalarMappable(BoundaryNorm(np.arange(count + 1) - 0.5, 256), "viridis")
-        ticks = sorted({0, count // 2, count - 1})
-        bar = figure.colorbar(scale, ax=axes, ticks=ticks, pad=0.02, aspect=15)
-        bar.ax.set_yticklabels([panel.names[k] for k in ticks])
-        bar.ax.tick_params(which="both", length=0)
-    elif count > 1:
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False, handlelength=1.2,
+    if panel.part and style.beside:
+        axes.set_title(panel.part, fontsize=style.legend, loc="left", color="0.35")
+    if count > 1 and style.beside:
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=style.legend, frameon=False, handlelength=1.2,
                     labelspacing=0.3)
+    elif count > 1:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=style.legend, frameon=False, handlelength=1.6,
+                    columnspacing=1.0, borderaxespad=0.1)
 
 
 def _show_small(axes: Any, values: np.ndarray) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from symdyn.pictures.bodies import draw_path, flat, make_artists, make_axes, sho
 from symdyn.pictures.curves import draw_panel
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
-from symdyn.pictures.panels import Panel, panels_of
+from symdyn.pictures.panels import Panel, panels_of, take
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
@@ -57,25 +56,24 @@ def _apart(panel: Panel) -> list[Panel]:
     sizes = np.abs(panel.values).max(axis=0)
     rising = np.sort(sizes[sizes > _NOTHING * sizes.max()])
     gaps = rising[1:] / rising[:-1]
-    if panel.title == "energy" or not gaps.max(initial=0.0) > _FLATTENS:
+    if panel.group == "energy" or not gaps.max(initial=0.0) > _FLATTENS:
         return [panel]
     large = sizes >= rising[1:][gaps.argmax()]
-    return [replace(panel, names=[name for name, there in zip(panel.names, mask, strict=True) if there],
-                    values=panel.values[:, mask]) for mask in (~large, large)]
+    return [take(panel, np.flatnonzero(mask).tolist(), panel.part) for mask in (~large, large)]
 
 
 def balance(solution: Solution, rows: np.ndarray) -> list[dict[str, str]]:
     """Work of the loads with what resets of events add, and change of energy, (n_t, 2), and their difference over time."""
     added = "work of loads and resets" if solution.reset_energy else "work of loads"
     less = f"{added.replace(' of loads', '')} \N{MINUS SIGN} change"
-    return [_curves(solution.t, Panel("energy", "J", [added, "change"], rows)),
-            _curves(solution.t, Panel("", "J", [less], rows[:, :1] - rows[:, 1:]), small=True)]
+    return [_curves(solution.t, Panel("energy", "J", [added, "change"], rows, [added, "change"])),
+            _curves(solution.t, Panel("", "J", [less], rows[:, :1] - rows[:, 1:], [less]), small=True)]
 
 
 def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> dict[str, str]:
     figure = Picture(figsize=(6.2, 2.6), layout="constrained")
     axes: Any = figure.add_subplot(111)
-    draw_panel(figure, axes, t, panel)
+    draw_panel(axes, t, panel)
     if small:
         axes.autoscale(axis="y")
     axes.set_xlabel("t [s]")

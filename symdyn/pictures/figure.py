@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from typing import Any
 
+import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -29,7 +30,9 @@ class Picture(Figure):
         if kind and kind not in self.canvas.get_supported_filetypes():
             raise ArgumentError(f"cannot save the picture to {target.name}: the ending must be .png, .pdf or .svg")
         try:
-            self.savefig(target, dpi=110)
+            # Letters stay letters: a PDF carries the fonts that it uses as TrueType.
+            with matplotlib.rc_context({"pdf.fonttype": 42}):
+                self.savefig(target, dpi=110)
         except OSError as error:
             raise ArgumentError(f"the picture cannot be written to {target}: {error.strerror}") from None
 

@@ -2,60 +2,97 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 from matplotlib.figure import Figure
 
+from symdyn.errors import ArgumentError
+from symdyn.kinds import word
 from symdyn.pictures.bodies import draw_path
 from symdyn.pictures.curves import draw_panel
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
-from symdyn.pictures.panels import panels_of
+from symdyn.pictures.panels import Panel, panels_of
+from symdyn.pictures.style import STYLES, Style
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
-# Changes of modes that are marked at most.
-MOST_SWITCHES = 80
+# Instants that are marked at most, and that are named at most.
+MOST_MARKS, MOST_NAMES = 80, 8
+# Sets of axes in one column at most, and columns.
+_ROWS, _COLUMNS = 4, 3
 
 
-def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
+def plot(solution: Solution, path: Any = None, view: Any = None, show: Sequence[Any] | None = None,
+         style: str = "screen") -> Figure:
     """Coordinates, speeds, states, inputs, outputs and energy over time, and the path of the mechanism.
 
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
+    show    names of coordinates, speeds, states, inputs or outputs, of groups of them ("coordinates", "speeds", "states",
+            "inputs", "outputs", "energy"), and "mechanism"; None for all
+    style   "screen", or "paper": curves alone for a column of a journal
 
-    Dotted lines mark the times at which contacts change their modes, forces of contacts are arrows.
-    Returns the figure; saves it (PNG, PDF, SVG by the ending) if a path is given.
+    Dotted lines mark the times at which contacts change their modes, dashed ones events; forces of contacts are arrows.
+    Returns the figure; saves it (PNG, PDF, SVG by the ending) if a path is given. Raises ArgumentError for names that there are
+    not, and where nothing is left to show.
     """
-    panels, switches = panels_of(solution), _switches(solution)
-    drawing = Drawing.of(solution) if len(solution.t) else None
-    columns = 1 if len(panels) <= 3 else 2
-    rows = -(-len(panels) // columns)
-    height = max(2.1 * rows, 5.2 if drawing else 4.2) + 0.5
+    name = solution.module.name
+    made_for = STYLES[word(style, STYLES, f"{name}: style")]
+    panels = panels_of(solution, show)
+    mechanism = style == "screen" and (show is None or "mechanism" in show)
+    drawing = Drawing.of(solution) if mechanism and len(solution.t) else None
+    if not panels and drawing is None and show is not None:
+        raise ArgumentError(f"{name}: nothing of show = {list(show)!r} is in this motion")
+    with matplotlib.rc_context(made_for.settings):
+        figure = _figure(solution, panels, drawing, made_for, view)
+        if style == "screen":
+            figure.suptitle(_title(solution), fontsize=11)
+        if path is not None:
+            figure.save(path)
+    return figure
+
+
+def _figure(solution: Solution, panels: Sequence[Panel], drawing: Drawing | None, style: Style, view: Any) -> Picture:
+    """Curves in columns one below the other, over the same time, and the mechanism on their right."""
+    columns = min(_COLUMNS, -(-len(panels) // _ROWS)) if style.beside else min(1, len(panels))
+    rows = -(-len(panels) // max(columns, 1))
+    height = max(style.high * rows, 5.2 if drawing else style.high) + (0.5 if style.beside else 0.35)
     side = min(height - 1.0, 5.5)
-    widths = [5.2] * columns + ([side] if drawing else [])
+    widths = [style.wide] * columns + ([side] if drawing else [])
     figure = Picture(figsize=(sum(widths), height), layout="constrained")
-    grid = figure.add_gridspec(rows, len(widths), width_ratios=widths)
+    grid = figure.add_gridspec(max(rows, 1), len(widths), width_ratios=widths)
+    events, switches = _events(solution), _switches(solution)
     shared: Any = None
     for k, panel in enumerate(panels):
-        row, column = divmod(k, columns)
-        # An odd last panel takes the whole row: room left blank says nothing.
-        end = columns if k == len(panels) - 1 else column + 1
-        axes = figure.add_subplot(grid[row, column:end], sharex=shared)
+        column, row = divmod(k, rows)
+        axes = figure.add_subplot(grid[row, column], sharex=shared)
         shared = shared or axes
-        draw_panel(figure, axes, solution.t, panel)
+        draw_panel(axes, solution.t, panel, style)
         for t in switches:
-            axes.axvline(t, color="0.75", linewidth=0.6, linestyle=":", zorder=0)
-        last = row == rows - 1
+            axes.axvline(t, color="0.7", linewidth=0.6, linestyle=":", zorder=0)
+        for t, _ in events:
+            axes.axvline(t, color="0.45", linewidth=0.7, linestyle=(0, (4, 3)), zorder=0)
+        if row == 0 and len(events) <= MOST_NAMES:
+            for t, event in events:
+                axes.annotate(event, (t, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(2, -2), textcoords="offset points",
+                              rotation=90, ha="left", va="top", fontsize=style.legend - 1, color="0.35")
+        last = row == rows - 1 or k == len(panels) - 1
         axes.tick_params(labelbottom=last)
         if last:
-            axes.set_xlabel("t [s]")
+            axes.set_xlabel("$t$ [s]")
     if drawing:
         draw_path(figure, grid[:, columns], drawing, view)
-    figure.suptitle(_title(solution), fontsize=11)
-    if path is not None:
-        figure.save(path)
+    figure.align_ylabels()
     return figure
+
+
+def _events(solution: Solution) -> list[tuple[float, str]]:
+    """Times of the system's events, and their names; none where there are too many to be seen."""
+    found = sorted((float(t), name) for name, rows in solution.events.items() for t in rows.t)
+    return found if len(found) <= MOST_MARKS else []
 
 
 def _switches(solution: Solution) -> list[float]:
@@ -65,7 +102,7 @@ def _switches(solution: Solution) -> list[float]:
     begin = float(solution.t[0])
     times = {float(t) for one in solution.contacts.values()
              for t in (*[when for when, _ in one.switches], *one.impacts.t) if t != begin}
-    return sorted(times) if len(times) <= MOST_SWITCHES else []
+    return sorted(times) if len(times) <= MOST_MARKS else []
 
 
 def _title(solution: Solution) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,3 +21,31 @@ def colors_of(count: int) -> list[Any]:
     if count > len(LINES):
         return list(colormaps["cividis"](np.linspace(0, 0.92, count)))
     return list(LINES[:count])
+
+
+@dataclass(frozen=True)
+class Style:
+    """What a picture is made for.
+
+    width    of curves and grid, points; dashes: of curves one after the other; legend: size of its letters
+    beside   whether legends stand on the right of their axes, else above; wide, high: of one set of axes, inches
+    settings of matplotlib while the picture is made
+    """
+
+    width: float
+    grid: float
+    dashes: Sequence[Any]
+    legend: float
+    beside: bool
+    wide: float
+    high: float
+    settings: dict[Any, Any]
+
+
+SCREEN = Style(1.4, 0.7, ("-",), 8, True, 5.2, 2.1, {})
+# A column of a journal is 86 mm wide; curves differ by their dashes, too, where it is printed without colours.
+PAPER = Style(0.9, 0.4, ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (3, 1, 1, 1))), 7, False,
+              3.39, 1.25, {"font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 8, "axes.linewidth": 0.5,
+                           "axes.labelsize": 8, "xtick.labelsize": 7, "ytick.labelsize": 7, "xtick.major.width": 0.5,
+                           "ytick.major.width": 0.5, "xtick.major.size": 2.5, "ytick.major.size": 2.5})
+STYLES = {"screen": SCREEN, "paper": PAPER}

@@ -132,6 +132,7 @@ def _panels(solution: Solution, order: np.ndarray) -> list[dict[str, Any]]:
     for panel in panels_of(solution):
         values = panel.values[rows]
         if np.isfinite(values).all():
-            found.append({"title": panel.title, "unit": panel.unit, "names": [n.replace("\n", " ") for n in panel.names],
+            title = f"{panel.title}: {panel.part}" if panel.part else panel.title
+            found.append({"title": title, "unit": panel.unit, "names": [n.replace("\n", " ") for n in panel.names],
                           "t": packed(solution.t[rows]), "values": packed(values)})
     return found

@@ -60,9 +60,10 @@ def labels(figure: Any) -> list[str]:
 def test_curves_have_names_and_units(tmp_path: Path) -> None:
     path = tmp_path / "motion.png"
     figure = plot(motion("double_pendulum"), path)
-    assert labels(figure) == ["coordinates [rad]", "speeds [rad/s]", "energy [J]", "y [m]"]
+    assert labels(figure) == ["$q_{1}$, $q_{2}$ [rad]", r"$\dot{q}_{1}$, $\dot{q}_{2}$ [rad/s]", "energy [J]", "y [m]"]
     shown = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes[:3]]
-    assert shown == [["q1", "q2"], ["q1_dot", "q2_dot"], ["kinetic", "potential\n(0 at start)", "total"]]
+    assert shown == [["$q_{1}$", "$q_{2}$"], [r"$\dot{q}_{1}$", r"$\dot{q}_{2}$"],
+                     ["kinetic", "potential\n(0 at start)", "total"]]
     assert "double_pendulum" in figure.get_suptitle()
     with image.open(path) as picture:
         assert picture.width > 800 and len(picture.convert("RGB").getcolors(1 << 24)) > 100
@@ -71,7 +72,8 @@ def test_curves_have_names_and_units(tmp_path: Path) -> None:
 def test_each_unit_has_its_axes_and_inputs_are_shown() -> None:
     module = motion("cart_pole").module
     figure = plot(module.simulate((0.0, 1.0), inputs={"F": 2.0}))
-    assert labels(figure)[:6] == ["q1 [m]", "q2 [rad]", "q1_dot [m/s]", "q2_dot [rad/s]", "F [N]", "energy [J]"]
+    assert labels(figure)[:6] == ["$q_{1}$ [m]", "$q_{2}$ [rad]", r"$\dot{q}_{1}$ [m/s]", r"$\dot{q}_{2}$ [rad/s]", "$F$ [N]",
+                                  "energy [J]"]
     assert labels(plot(module.simulate((0.0, 1.0))))[4] == "energy [J]"
 
 
@@ -87,11 +89,63 @@ def test_curves_are_the_solution() -> None:
             assert np.array_equal(line.get_xdata(), solution.t) and np.array_equal(line.get_ydata(), column)
 
 
-def test_many_curves_take_a_colour_scale_instead_of_a_legend() -> None:
-    figure = plot(motion("n_link_pendulum", (0.0, 0.01), n=13))
-    assert figure.axes[0].get_legend() is None
-    scale = next(axes for axes in figure.axes if axes.get_label() == "<colorbar>")
-    assert [text.get_text() for text in scale.get_yticklabels()] == ["q1", "q7", "q13"]
+def test_many_curves_are_divided_by_joints() -> None:
+    """Of 24 coordinates each set of axes has as many as its legend can name in colours of their own."""
+    figure = plot(motion("n_link_pendulum", (0.0, 0.01), n=24))
+    curves = [axes for axes in figure.axes if axes.get_ylabel() == "coordinates [rad]"]
+    assert [axes.get_title(loc="left") for axes in curves] == [f"hinge{k} \N{EN DASH} hinge{k + 7}" for k in (1, 9, 17)]
+    for k, axes in enumerate(curves):
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert names == [f"$q_{{{8 * k + j}}}$" for j in range(1, 9)]
+        assert len({line.get_color() for line in axes.lines}) == 8
+
+
+def test_time_axes_are_aligned() -> None:
+    figure = plot(motion("n_link_pendulum", (0.0, 0.01), n=24))
+    figure.canvas.draw()
+    curves = [axes for axes in figure.axes if "[m]" not in axes.get_ylabel()]
+    assert len(curves) == 7 and len({axes.get_xlim() for axes in curves}) == 1
+    edges = [{round(float(edge), 6) for edge in (axes.get_position().x0, axes.get_position().x1)} for axes in curves]
+    assert all(edge == edges[0] for edge in edges[:4]) and all(edge == edges[4] for edge in edges[4:])
+
+
+def test_what_is_shown_can_be_chosen() -> None:
+    solution = motion("double_pendulum")
+    assert labels(plot(solution, show=["q2", "total"])) == ["$q_{2}$ [rad]", "total [J]"]
+    assert labels(plot(solution, show=[symdyn.coordinates("q1"), "speeds", "mechanism"])) == [
+        "$q_{1}$ [rad]", r"$\dot{q}_{1}$, $\dot{q}_{2}$ [rad/s]", "y [m]"]
+    with pytest.raises(ArgumentError, match=r"'omega', which are no curves of this motion; there are kinetic, potential, q1,"):
+        plot(solution, show=["omega", "q1"])
+    for wrong in ("energy", [1.0]):
+        with pytest.raises(ArgumentError, match="pass a list of names"):
+            plot(solution, show=wrong)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match=r"nothing of show = .'outputs'. is in this motion"):
+        plot(solution, show=["outputs"])
+
+
+def test_on_paper_curves_are_as_wide_as_a_column_with_their_letters(tmp_path: Path) -> None:
+    path = tmp_path / "column.pdf"
+    figure = motion("double_pendulum").plot(path, style="paper")
+    assert figure.get_figwidth() == pytest.approx(86 / 25.4, abs=0.01)
+    assert labels(figure)[-1] == "energy [J]" and not figure.get_suptitle()
+    written = path.read_bytes()
+    assert b"/FontFile2" in written and b"/Type3" not in written
+    lines = figure.axes[0].lines
+    assert len({line.get_linestyle() for line in lines}) == len(lines) == 2
+    with pytest.raises(ArgumentError, match="style is 'print'; pass 'screen' or 'paper'"):
+        motion("double_pendulum").plot(style="print")
+
+
+def test_events_are_marked_with_their_names() -> None:
+    system = systems.pendulum()
+    system.add_event("lowest", symdyn.coordinates("q1"))
+    solution = system.embedding().compile("numpy").simulate((0.0, 3.0), q=[0.5])
+    top, *others = plot(solution).axes[:3]
+    times = [float(t) for t in solution.events["lowest"].t]
+    assert len(times) >= 2
+    for axes in (top, *others):
+        assert [float(np.asarray(line.get_xdata())[0]) for line in axes.lines if line.get_linestyle() == "--"] == times
+    assert [note.get_text() for note in top.texts] == ["lowest"] * len(times) and not others[0].texts
 
 
 def test_rounding_errors_of_a_constant_do_not_fill_the_axes() -> None:
@@ -110,7 +164,7 @@ def test_states_and_outputs_have_axes() -> None:
     system.add_output("pair", [q, z])
     solution = system.embedding().compile("numpy").simulate((0.0, 0.2))
     figure = plot(solution)
-    assert {"z", "height", "output"} <= {re.sub(r" \[.*", "", label) for label in labels(figure)}
+    assert {"$z$", "height", "output"} <= {re.sub(r" \[.*", "", label) for label in labels(figure)}
     pair = next(axes for axes in figure.axes if axes.get_ylabel() == "output")
     assert [line.get_label() for line in pair.lines] == ["pair[0]", "pair[1]"]
 
@@ -119,7 +173,7 @@ def test_equations_without_bodies_have_curves_alone() -> None:
     x = symdyn.coordinates("x")
     m, g = symdyn.parameters("m g")
     solution = symdyn.embedding([x], [x], [m], [-m * g], defaults={m: 1, g: 9.81}).compile("numpy").simulate((0, 1))
-    assert labels(plot(solution)) == ["x", "x_dot"]
+    assert labels(plot(solution)) == ["$x$", r"$\dot{x}$"]
     with pytest.raises(ArgumentError, match="nothing to animate"):
         animate(solution)
 

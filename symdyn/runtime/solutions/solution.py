@@ -608,19 +608,27 @@ class Solution:
 
     # -- pictures and files
 
-    def plot(self, path: PathName | None = None, view: Sequence[float] | None = None) -> Figure:
+    def plot(self, path: PathName | None = None, view: Sequence[float] | None = None,
+             show: Sequence[str | sp.Symbol] | None = None, style: str = "screen") -> Figure:
         """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given.
 
-        view   (elevation, azimuth) of the eye on the mechanism, degrees
+        view    (elevation, azimuth) of the eye on the mechanism, degrees
+        show    what is shown: names of coordinates, speeds, states, inputs, outputs, "kinetic", "potential", "total"; of groups,
+                "coordinates", "speeds", "states", "inputs", "outputs", "energy"; and "mechanism"; everything by default
+        style   "screen", or "paper": curves alone, as wide as a column of a journal (86 mm), in its letters, for a PDF
+
+        More curves than eight are divided by the joints that they belong to. Events are marked by dashed lines, changes of the
+        modes of contacts by dotted ones. Raises ArgumentError for names that there are not, and for another style.
 
         >>> import tempfile
         >>> folder = tempfile.mkdtemp()
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
         >>> figure = solution.plot(f"{folder}/motion.png")
+        >>> figure = solution.plot(f"{folder}/column.pdf", show=["coordinates", "energy"], style="paper")
         """
         from symdyn.pictures import plot
 
-        return plot(self, path, view)
+        return plot(self, path, view, show, style)
 
     def picture(self, t: Times | PathName | None = None, path: PathName | None = None,
                 view: Sequence[float] | Sequence[Sequence[float]] | None = None) -> Figure:

@@ -1,0 +1,40 @@
+"""Names as they are typeset: theta_1_dot becomes a theta with an index and a dot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+_GREEK = frozenset("alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi rho sigma tau phi chi psi omega "
+                   "Gamma Delta Theta Lambda Xi Sigma Phi Psi Omega".split())
+# A letter, Greek or Latin, with an index or without.
+_SYMBOL = re.compile(r"([A-Za-z]+?)(?:_?(\d+)|_([A-Za-z0-9_]+)|)")
+_ACCENTS = {"_dot": r"\dot", "_ddot": r"\ddot"}
+
+
+def typeset(name: str) -> str:
+    r"""A name in the mathematics of matplotlib: "q1_dot" is $\dot{q}_{1}$; names that are words stay as they are.
+
+    >>> typeset("theta_2_ddot"), typeset("steer")
+    ('$\\ddot{\\theta}_{2}$', 'steer')
+    """
+    suffix = next((end for end in ("_ddot", "_dot") if name.endswith(end)), "")
+    match = _SYMBOL.fullmatch(name.removesuffix(suffix))
+    letter = match[1].replace("lamda", "lambda") if match else ""
+    if match is None or not (letter in _GREEK or len(letter) == 1):
+        return name.replace("$", r"\$")
+    head = rf"\{letter}" if letter in _GREEK else letter
+    if suffix:
+        head = rf"{_ACCENTS[suffix]}{{{head}}}"
+    index = match[2] or (match[3] or "").replace("_", r",\,")
+    if index and not index.isdigit():
+        index = rf"\mathrm{{{index}}}"
+    return f"${head}_{{{index}}}$" if index else f"${head}$"
+
+
+def axis_label(names: Sequence[str], title: str, unit: str) -> str:
+    """What an axis is called: up to three symbols, else the title of its curves; with the unit."""
+    signs = [typeset(name) for name in names]
+    few = len(names) == 1 or (len(names) <= 3 and all(sign.startswith("$") for sign in signs))
+    label = ", ".join(signs) if few else title
+    return f"{label} [{unit}]" if unit else label
