@@ -16,6 +16,7 @@ import symdyn as sd
 from symdyn.formulation.equations import Equations
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
+from symdyn.statics.linearize import Linearization
 
 # Methods that other parts of symdyn call; a Campbell diagram needs a rotor, which tests/runtime/test_campbell.py has.
 WITHOUT = {"Module.following", "Module.motions_at", "Module.split_outputs", "Module.unit", "Module.noting", "Module.campbell",
@@ -33,6 +34,9 @@ def _public() -> Iterator[tuple[str, Any]]:
             called = isinstance(thing, (property, functools.cached_property)) or inspect.isfunction(thing)
             if called and not name.startswith("_") and f"{owner.__name__}.{name}" not in WITHOUT:
                 yield f"{owner.__name__}.{name}", thing
+    for name, thing in vars(Linearization).items():
+        if not name.startswith("_") and ">>>" in (inspect.getdoc(thing) or ""):
+            yield f"Linearization.{name}", thing
 
 
 PUBLIC = dict(_public())

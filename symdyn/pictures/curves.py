@@ -18,7 +18,7 @@ def draw_panel(axes: Any, t: np.ndarray, panel: Panel, style: Style = SCREEN) ->
     count = len(panel.names)
     colors = _ENERGY if panel.group == "energy" and count == 3 else colors_of(count)
     for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
-        label = typeset(name if style.beside else name.replace("\n", " "))
+        label = typeset(name if style.aside else name.replace("\n", " "))
         axes.plot(t, values, label=label, linewidth=style.width, color=colors[k], linestyle=style.dashes[k % len(style.dashes)],
                   marker="." if len(t) == 1 else None)
     axes.set_ylabel(axis_label(panel.names, panel.title, panel.unit))
@@ -26,9 +26,9 @@ def draw_panel(axes: Any, t: np.ndarray, panel: Panel, style: Style = SCREEN) ->
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     _show_small(axes, panel.values)
-    if panel.part and style.beside:
+    if panel.part and style.aside:
         axes.set_title(panel.part, fontsize=style.legend, loc="left", color="0.35")
-    if count > 1 and style.beside:
+    if count > 1 and style.aside:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=style.legend, frameon=False, handlelength=1.2,
                     labelspacing=0.3)
     elif count > 1:

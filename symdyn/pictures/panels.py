@@ -41,7 +41,7 @@ class Panel:
 
 
 def panels_of(solution: Solution, show: Sequence[str] | None = None) -> list[Panel]:
-    """Coordinates, speeds, states, inputs, outputs and energy, as far as there are any; more than a reader can tell apart are
+    """Coordinates, speeds, states, inputs, outputs and energy, as far as there are any; more than eyes can distinguish are
     divided by joints.
 
     show   names of curves or of groups, None for all
@@ -82,7 +82,7 @@ def take(panel: Panel, places: Sequence[int], part: str = "") -> Panel:
 
 
 def _parts(solution: Solution, panel: Panel) -> list[Panel]:
-    """A panel, or several with as many curves as can be told apart; what belongs to one joint stays together."""
+    """A panel, or several with as many curves as eyes can distinguish; what belongs to one joint stays together."""
     count = len(panel.names)
     if count <= MOST:
         return [panel]

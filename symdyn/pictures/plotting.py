@@ -57,9 +57,9 @@ def plot(solution: Solution, path: Any = None, view: Any = None, show: Sequence[
 
 def _figure(solution: Solution, panels: Sequence[Panel], drawing: Drawing | None, style: Style, view: Any) -> Picture:
     """Curves in columns one below the other, over the same time, and the mechanism on their right."""
-    columns = min(_COLUMNS, -(-len(panels) // _ROWS)) if style.beside else min(1, len(panels))
+    columns = min(_COLUMNS, -(-len(panels) // _ROWS)) if style.aside else min(1, len(panels))
     rows = -(-len(panels) // max(columns, 1))
-    height = max(style.high * rows, 5.2 if drawing else style.high) + (0.5 if style.beside else 0.35)
+    height = max(style.high * rows, 5.2 if drawing else style.high) + (0.5 if style.aside else 0.35)
     side = min(height - 1.0, 5.5)
     widths = [style.wide] * columns + ([side] if drawing else [])
     figure = Picture(figsize=(sum(widths), height), layout="constrained")

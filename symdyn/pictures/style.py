@@ -28,7 +28,7 @@ class Style:
     """What a picture is made for.
 
     width    of curves and grid, points; dashes: of curves one after the other; legend: size of its letters
-    beside   whether legends stand on the right of their axes, else above; wide, high: of one set of axes, inches
+    aside    whether legends stand on the right of their axes, else above; wide, high: of one set of axes, inches
     settings of matplotlib while the picture is made
     """
 
@@ -36,7 +36,7 @@ class Style:
     grid: float
     dashes: Sequence[Any]
     legend: float
-    beside: bool
+    aside: bool
     wide: float
     high: float
     settings: dict[Any, Any]

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from symdyn.statics.equilibria import Equilibria
     from symdyn.statics.equilibrium import Equilibrium
     from symdyn.statics.linearize import Linearization
+    from symdyn.statics.locus import RootLocus
     from symdyn.statics.periodic import PeriodicMotion
     from symdyn.statics.stability import Stability
 
@@ -1010,6 +1011,27 @@ class Module:
         self._demand_no_rigid_contacts("natural frequencies over a speed")
         return campbell(self, speed, values, free, fixed, start, params, t, inputs, blades, azimuth, azimuths, max_iterations,
                         frame, averaged)
+
+    def root_locus(self, parameter: Key, values: Times, at: Start | None = None, free: Names | None = None,
+                   fixed: Numbers | None = None, start: Start | None = None, params: States | None = None, t: float = 0.0,
+                   inputs: States | None = None) -> RootLocus:
+        """Eigenvalues of the linear equations over a parameter; its `plot` shows them in the complex plane.
+
+        parameter   name or symbol; values: its numbers. At each the equilibrium is found, from that of the value before
+        at          a state where the equations are made linear in place of an equilibrium, see `linearize`
+        free, fixed, start, params, t, inputs   as for `equilibrium`
+
+        Modes are followed from value to value by the likeness of their shapes. Raises NoEquilibrium, ArgumentError.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.root_locus("l", [1.0, 4.0], start={"q1": 0.1}).eigenvalues.imag.ravel().round(6)
+        array([3.132092, 1.566046])
+        """
+        from symdyn.statics.locus import root_locus
+
+        self._demand_no_rigid_contacts("eigenvalues over a parameter")
+        more = {"t": t, "inputs": inputs, "free": free, "fixed": fixed} | ({"start": start} if start is not None else {})
+        return root_locus(self, parameter, values, at, params, **more)
 
     def _demand_no_rigid_contacts(self, what: str) -> None:
         """Raise ArgumentError where modes of rigid contacts would have to be chosen."""

@@ -32,10 +32,12 @@ if TYPE_CHECKING:
     from control import StateSpace as ControlStateSpace
     from scipy.signal import StateSpace as ScipyStateSpace
 
-    from symdyn.given import Key
+    from symdyn.given import Key, Names, Times
     from symdyn.runtime.module import Module
+    from symdyn.runtime.solutions.solution import Solution
     from symdyn.statics.modes import Mode
     from symdyn.statics.regulator import Regulator, Weights
+    from symdyn.statics.response import Response
     from symdyn.statics.stability import Stability
 
 
@@ -178,12 +180,54 @@ class Linearization:
 
         return of_manifold(self._manifold)
 
+    @property
+    def inertia(self) -> np.ndarray:
+        """The mass matrix that compares shapes of modes, (n_u, n_u)."""
+        return self._manifold.inertia
+
     def modes(self) -> Modes:
         """Natural frequencies, damping ratios, periods, shapes; prints as a table. See symdyn.statics.modes.
 
         Raises ArgumentError where A is not constant along the motion.
         """
         return self._modes
+
+    def mode_motion(self, mode: int | str | Mode, amplitude: float | None = None, periods: int = 1) -> Solution:
+        """The mechanism moving in the shape of a mode, to look at: a Solution, with view(), animate() and plot().
+
+        mode        one of modes(), its number, or its name
+        amplitude   largest change of a coordinate; by default so that it is well seen
+        periods     how many of an oscillation, which is shown without its decay; of a real mode three time constants are shown
+
+        Closed loops stay closed. It is no solution of the nonlinear equations. Raises ArgumentError for a mode that has the
+        eigenvalue zero, and for an amplitude that the mechanism cannot reach.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> motion = module.linearize({"q1": 0.0}).mode_motion(0, amplitude=0.3)
+        >>> f"{motion.t[-1]:.6f} s, {motion['q1'].max():.6f} rad"
+        '2.006067 s, 0.300000 rad'
+        """
+        from symdyn.statics.swing import mode_motion
+
+        return mode_motion(self, mode, amplitude, periods)
+
+    def response(self, omega: Times | None = None, inputs: Names | None = None, outputs: Names | None = None) -> Response:
+        """The harmonic response H(i omega) = C (i omega - A)^-1 B + D; its `plot` is the Bode diagram.
+
+        omega             frequencies, rad/s; by default from a tenth of the slowest eigenvalue to ten times the fastest
+        inputs, outputs   by name, all by default; states are the outputs of a system that has none
+
+        It is infinite at the frequency of an undamped mode. Raises ArgumentError for a system without inputs, for frequencies
+        that are not positive, and where A is not constant along the motion.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": 3.141592653589793})
+        >>> linear.response([1.0, 10.0], outputs="q1").gain.shape
+        (2, 1, 1)
+        """
+        from symdyn.statics.response import response
+
+        self._demand_steady("a response was")
+        return response(self, omega, inputs, outputs)
 
     # -- control
 
@@ -234,7 +278,7 @@ class Linearization:
         """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs."""
         from scipy.signal import StateSpace
 
-        return StateSpace(self.A, self.B, *self._observed()[:2])
+        return StateSpace(self.A, self.B, *self.observed()[:2])
 
     def to_control(self) -> ControlStateSpace:
         """The equations as a control.StateSpace of python-control, with names of states, inputs and outputs; with the states as
@@ -243,11 +287,11 @@ class Linearization:
             import control
         except ImportError:
             raise MissingExtra("linear.to_control() needs the package control: pip install 'symdyn[control]'") from None
-        C, D, outputs = self._observed()
+        C, D, outputs = self.observed()
         return control.ss(self.A, self.B, C, D, states=list(self.states), inputs=list(self.module.metadata.inputs),
                           outputs=list(outputs), name=self.module.name)
 
-    def _observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    def observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
         """C, D and names of the outputs, or of the states without outputs."""
         if self.outputs:
             return self.C_out, self.D, self.outputs
