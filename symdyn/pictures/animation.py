@@ -29,14 +29,14 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
 
     fps     pictures a second; speed: seconds of motion in one second of film
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
-    path    where to save the film; a GIF, which needs Pillow and nothing else
+    path    where to save the film: a .gif, which needs Pillow and nothing else, or an .mp4 by the program ffmpeg
 
-    Returns the animation; a notebook shows it with buttons. Raises ArgumentError if the module gives no positions, if
-    nothing can be drawn, or for another ending than .gif.
+    Returns the animation; a notebook shows it. Raises ArgumentError if the module gives no positions, if nothing can be drawn,
+    for another ending, and for .mp4 without ffmpeg.
     """
     target = None if path is None else as_path(path, "of the animation", "motion.gif")
-    if target is not None and target.suffix.lower() != ".gif":
-        raise ArgumentError(f"cannot save the animation to {target.name}: the ending must be .gif")
+    if target is not None and target.suffix.lower() not in (".gif", ".mp4"):
+        raise ArgumentError(f"cannot save the animation to {target.name}: the ending must be .gif or .mp4")
     rate, speed = (number_of(v, solution.module.name, f"{what} must be a positive number")
                   for v, what in ((fps, "fps"), (speed, "speed")))
     if not (LEAST_FPS <= rate <= 1 / LEAST_FPS and 0 < speed < np.inf):
@@ -77,7 +77,10 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     film = Film(figure, draw, count, rate)
     if target is not None:
         try:
-            target.write_bytes(film.gif())
+            if target.suffix.lower() == ".mp4":
+                film.write_mp4(target, solution.module.name)
+            else:
+                target.write_bytes(film.gif())
         except OSError as error:
             raise ArgumentError(f"the animation cannot be written to {target}: {error.strerror}") from None
     return film

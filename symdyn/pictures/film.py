@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 from PIL import Image
+
+from symdyn.errors import ArgumentError
+
+# Pixels a side: H.264 wants even numbers.
+_EVEN = 2
+_SAID = 400
 
 
 class Film(FuncAnimation):
@@ -24,25 +33,57 @@ class Film(FuncAnimation):
         self.figure, self.place, self.count, self.fps = figure, draw, count, fps
 
     def gif(self) -> bytes:
-        """The film as a GIF: what stays is drawn once, and what moves over it for each picture."""
+        """The film as a GIF."""
+        self.place(self.count - 1)
+        palette = _palette(_pixels(self.figure))
+        images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in self._images()]
+        data = io.BytesIO()
+        images[0].save(data, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / self.fps), loop=0)
+        return data.getvalue()
+
+    def write_mp4(self, path: Path, name: str) -> None:
+        """Write the film as H.264 by the program ffmpeg; name: of the mechanism, for messages.
+
+        Raises ArgumentError where ffmpeg is not installed, and with what it reports.
+        """
+        program = shutil.which("ffmpeg")
+        if program is None:
+            raise ArgumentError(f"{name}: an animation as .mp4 needs the program ffmpeg, which is not on the path; install it, "
+                                "or take the ending .gif, which needs nothing else")
+        images = self._images()
+        first = next(images)
+        width, height = (side - side % _EVEN for side in first.size)
+        command = [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+                   "-r", f"{self.fps:g}", "-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18",
+                   "-movflags", "+faststart", str(path)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+            assert running.stdin is not None and running.stderr is not None
+            try:
+                for image in (first, *images):
+                    running.stdin.write(image.crop((0, 0, width, height)).tobytes())
+                running.stdin.close()
+            except BrokenPipeError:  # it has ended; what it reports says why
+                pass
+            said = running.stderr.read().decode(errors="replace").strip()
+        if running.returncode:
+            why = said[-_SAID:] or f"it ended with {running.returncode}"
+            raise ArgumentError(f"{name}: ffmpeg could not write {path}: {why}")
+
+    def _images(self) -> Iterator[Image.Image]:
+        """The pictures: what stays is drawn once, and what moves over it for each."""
         figure: Any = self.figure
         moving = self.place(self.count - 1)
-        palette = _palette(_pixels(figure))
         for artist in moving:
             artist.set_animated(True)
         figure.canvas.draw()
         background = figure.canvas.copy_from_bbox(figure.bbox)
-        images = []
         for k in range(self.count):
             figure.canvas.restore_region(background)
             for artist in self.place(k):
                 figure.draw_artist(artist)
-            images.append(_pixels(figure, draw=False).quantize(palette=palette, dither=Image.Dither.NONE))
+            yield _pixels(figure, draw=False)
         for artist in moving:
             artist.set_animated(False)
-        data = io.BytesIO()
-        images[0].save(data, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / self.fps), loop=0)
-        return data.getvalue()
 
     def _repr_html_(self) -> str:
         return f'<img src="data:image/gif;base64,{base64.b64encode(self.gif()).decode()}">'

@@ -462,13 +462,37 @@ def test_a_film_runs_backwards_with_its_motion() -> None:
 
 def test_films_that_cannot_be_are_refused(tmp_path: Path) -> None:
     solution = motion("pendulum")
-    with pytest.raises(ArgumentError, match=r"film\.mp4: the ending must be \.gif"):
-        animate(solution, tmp_path / "film.mp4")
+    with pytest.raises(ArgumentError, match=r"film\.avi: the ending must be \.gif or \.mp4"):
+        animate(solution, tmp_path / "film.avi")
     with pytest.raises(ArgumentError, match=r"1e\+04 pictures; raise speed above 0\.333"):
         animate(solution, fps=1000, speed=0.1)
     with pytest.raises(ArgumentError, match="must be positive"):
         animate(solution, speed=0)
     assert not list(tmp_path.iterdir())
+
+
+def test_without_ffmpeg_the_way_to_a_film_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ArgumentError, match=r"needs the program ffmpeg, which is not on the path; .* take the ending \.gif"):
+        animate(motion("pendulum"), tmp_path / "film.mp4")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the program is a shell script")
+def test_ffmpeg_gets_every_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program in place of ffmpeg that keeps what it is sent: pictures of even sides, one after the other; or that fails."""
+    program, kept, film = tmp_path / "ffmpeg", tmp_path / "kept", tmp_path / "film.mp4"
+    program.write_text(f'#!/bin/sh\ncat > {kept}\necho "$@" > {film}\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    animate(motion("pendulum"), film, fps=4)
+    asked = film.read_text().split()
+    width, height = map(int, asked[asked.index("-s") + 1].split("x"))
+    pictures = np.frombuffer(kept.read_bytes(), np.uint8).reshape(-1, height, width, 3)
+    assert width % 2 == height % 2 == 0 and len(pictures) == 5 and asked[asked.index("-r") + 1] == "4"
+    assert (pictures[0] != pictures[4]).any() and pictures[0, :3, -3:].min() == 255
+    program.write_text("#!/bin/sh\necho Unknown encoder libx264 >&2\nexit 1\n")
+    with pytest.raises(ArgumentError, match=r"ffmpeg could not write .*film\.mp4: Unknown encoder libx264"):
+        animate(motion("pendulum"), film, fps=4)
 
 
 def test_a_picture_takes_its_path_alone(tmp_path: Path) -> None:

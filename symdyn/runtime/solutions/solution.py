@@ -651,7 +651,11 @@ class Solution:
 
     def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
                 view: Sequence[float] | None = None) -> FuncAnimation:
-        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`.
+        """The moving bodies; returns the matplotlib animation, and saves it if a path is given: as .gif, or as .mp4 where the
+        program ffmpeg is installed.
+
+        fps    pictures a second; speed: seconds of motion in one second of film; view: as for `plot`
+        Raises ArgumentError for another ending, for .mp4 without ffmpeg, and if nothing can be drawn.
 
         >>> import tempfile
         >>> folder = tempfile.mkdtemp()
