@@ -28,15 +28,33 @@ def touching(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return at, forces
 
 
-def arrow_scale(forces: np.ndarray, extent: float) -> np.ndarray:
-    """Lengths of arrows by forces (n_t, n_c, 2 or 3), m/N: the median force has LENGTH of the extent."""
+def names_of(solution: Solution) -> list[str]:
+    """What the contacts in `touching` are called."""
+    about, count = solution.module.metadata, solution.module.shape(POINTS)[0] // 6
+    names = [*(record.name for record in about.contacts), *(record.name for record in about.compliant)]
+    return names if len(names) == count else [f"contact {k + 1}" for k in range(count)]
+
+
+def usual(forces: np.ndarray) -> float:
+    """The median size of forces (n_t, n_c, 3), N; zero without any."""
     sizes = np.linalg.norm(forces, axis=2)
     there = sizes[np.isfinite(sizes) & (sizes > 0)]
-    if not len(there):
+    return float(np.median(there)) if len(there) else 0.0
+
+
+def floor_of(at: np.ndarray, up: np.ndarray, near: float) -> float | None:
+    """How high the flat ground is on which all contacts touch that do; None where they touch at several heights."""
+    heights = (at @ up)[np.isfinite(at).all(axis=2)]
+    return float(np.median(heights)) if len(heights) and np.ptp(heights) <= near else None
+
+
+def arrow_scale(forces: np.ndarray, extent: float) -> np.ndarray:
+    """Lengths of arrows by forces (n_t, n_c, 2 or 3), m/N: the median force has LENGTH of the extent."""
+    sizes, middle = np.linalg.norm(forces, axis=2), usual(forces)
+    if not middle:
         return np.zeros((1, 1, 1))
-    usual = float(np.median(there))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (LENGTH * extent * np.minimum(1 / usual, LONGEST / sizes))[:, :, None]
+        return (LENGTH * extent * np.minimum(1 / middle, LONGEST / sizes))[:, :, None]
 
 
 def arrows(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:

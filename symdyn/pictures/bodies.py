@@ -25,6 +25,8 @@ VIEW_OF_SOLIDS = (14.0, -58.0)
 ZOOM = 0.79
 # Forces of contacts.
 FORCE = "#B45309"
+# Of flat ground, of the extent of the picture.
+_THICK = 0.015
 # What is drawn over all shapes.
 ABOVE = 1e6
 
@@ -64,6 +66,10 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
         axes.locator_params(axis="x", nbins=6)
         axes.grid(True, color="0.92", linewidth=0.7)
         axes.set_axisbelow(True)
+        if drawing.ground is not None and below in drawing.axes:
+            level = drawing.ground * drawing.up[below]
+            (axes.axhspan if drawing.axes[1] == below else axes.axvspan)(
+                level, level - _THICK * drawing.up[below] * float(np.ptp(limits)), color="0.78", linewidth=0)
     return axes
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symdyn.pictures.arrows import arrow_scale, touching
+from symdyn.pictures.arrows import arrow_scale, floor_of, touching
 from symdyn.pictures.jointed import carriers, jointed_skeleton, placed_joints
 from symdyn.pictures.looks import up_of
 from symdyn.pictures.points import points_of
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 _LEFT_OUT = 1e-9
+# Contacts at heights that differ by less touch a flat ground; of how far all goes.
+_FLAT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Drawing:
     sliders    the bodies that slide, and which points of their lines do; labels: of the axes
     solids     shapes, if there are any; bare: the bodies without
     touches    where contacts touch, (n_t, n_c, 2 or 3), NaN while they do not; pushes: the ends of the arrows of their forces
-    up         the direction that is above
+    up         the direction that is above; ground: how high the flat ground is on which contacts touch, if they do
     """
 
     lines: list[np.ndarray]
@@ -48,6 +50,7 @@ class Drawing:
     touches: np.ndarray
     pushes: np.ndarray
     up: tuple[float, float, float]
+    ground: float | None
 
     @property
     def sticks(self) -> bool:
@@ -80,6 +83,7 @@ class Drawing:
         if solids is not None:
             skeleton = _without(skeleton, bare)
         touches, forces = touching(solution)
+        where = touches
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
                                      touches.reshape(-1, 3), skeleton.pivots,
                                      solids.reach() if solids is not None and solids.own else np.zeros((0, 3))])
@@ -96,8 +100,10 @@ class Drawing:
             skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, touches, forces, *skeleton.lines)]
         pushes = touches + forces * arrow_scale(forces, float(ranges.max()))
         about = solution.module.metadata
+        up = up_of(about.down, about.planar)
+        ground = floor_of(where, np.array(up), _FLAT * float(ranges.max()))
         return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare, touches,
-                   pushes, up_of(about.down, about.planar))
+                   pushes, up, ground)
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""
@@ -108,8 +114,9 @@ class Drawing:
         arms, rails, rods, centres, touches, pushes, *lines = [
             points[a] * (1 - w) + points[b] * w for points in
             (self.arms, self.rails, self.rods, self.centres, self.touches, self.pushes, *self.lines)]
-        return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels,
-                       None if self.solids is None else self.solids.at(t, times), self.bare, touches, pushes, self.up)
+        solids = None if self.solids is None else self.solids.at(t, times)
+        return replace(self, lines=lines, arms=arms, rails=rails, rods=rods, centres=centres, solids=solids, touches=touches,
+                       pushes=pushes)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""

@@ -13,7 +13,9 @@ from symdyn.pictures.mechanism import Hung, Posed
 from symdyn.pictures.meshes import Part, box, line, sweep
 
 # Bands of a ball, and the turns of a coil with their points.
-_BANDS = 7
+_BANDS = 8
+# How far from its poles a ball is cut off, rad.
+_POLE = 0.06
 # Corners around rods, and around what is as wide as it likes: wheels and bodies without a joint.
 _ROD, _WHEEL = 16, 40
 _TURNS, _PER_TURN = 9, 12
@@ -131,7 +133,7 @@ def _rod(body: int, color: tuple[float, float, float], around: int) -> Part:
 
 
 def _ball(body: int, color: tuple[float, float, float]) -> Part:
-    angles = np.pi * np.arange(1, _BANDS) / _BANDS
+    angles = np.concatenate([[_POLE], np.pi * np.arange(1, _BANDS) / _BANDS, [np.pi - _POLE]])
     points = np.column_stack([0 * angles, 0 * angles, -np.cos(angles)])
     made = sweep(body, color, points, np.repeat(2 * np.sin(angles), 2).reshape(-1, 2))
     return replace(made, creases=np.zeros(len(made.creases), dtype=bool))

@@ -6,8 +6,8 @@ that move, so that the same list holds at every configuration and for other valu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,7 @@ class Mechanism:
     down          direction of gravity, zero where there is none
     tips          further points that bodies reach to: body, (3,) in its axes
     travels       how far joints slide along their axes in a motion: least and most, m; () where it is not known
+    corners       points that contacts have on bodies: body, (3,) in its axes; wheels: radii of bodies that touch with a rim, m
     """
 
     bodies: Sequence[str]
@@ -57,6 +58,8 @@ class Mechanism:
     drawn: frozenset[int] = frozenset()
     tips: Sequence[tuple[int, np.ndarray]] = ()
     travels: Sequence[tuple[float, float]] = ()
+    corners: Sequence[tuple[int, np.ndarray]] = ()
+    wheels: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def points(self) -> np.ndarray:
@@ -207,6 +210,10 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
     centre = m.centre(body)
     at_centre = (body, *centre)
     extended = float(np.sqrt(max(np.trace(moments), 0.0))) > _EXTENT * length
+    if body in m.wheels:
+        return [_wheel(m, body, held, r)]
+    if sum(owner == body for owner, _ in m.corners) > 1 and all(isinstance(ref, tuple) for ref, _, _ in held):
+        return [_cornered(m, body, r)]
     sphere = Item("ball", (at_centre,), (2.4 * r,), color, name)
     if len(held) > 1:
         items = list(_rods(m, held, r, color, name))
@@ -245,7 +252,7 @@ def _attached(m: Mechanism, body: int, length: float) -> list[tuple[Ref, np.ndar
     candidates = [(2 * j + side, j) for j, side in ends] + [
         (springs + k, -1) for k, owner in enumerate(m.owners()[springs:]) if owner == body]
     every = [(ref, m.local(body, m.points[ref]), j) for ref, j in candidates] + [
-        ((body, *tip), tip, -1) for owner, tip in m.tips if owner == body]
+        ((body, *tip), tip, -1) for owner, tip in (*m.tips, *m.corners) if owner == body]
     for ref, point, j in every:
         if all(np.linalg.norm(point - other) > _SAME * length for _, other, _ in found):
             found.append((ref, point, j))
@@ -271,6 +278,33 @@ def _rods(m: Mechanism, held: Sequence[tuple[Ref, np.ndarray, int]], r: float, c
         yield Item("rod", (first, ref), (r, 0.7 * r), color, name)
     if len(held) == 3:
         yield Item("rod", (held[1][0], held[2][0]), (0.7 * r, 0.7 * r), color, name)
+
+
+def _wheel(m: Mechanism, body: int, held: Sequence[tuple[Ref, np.ndarray, int]], r: float) -> Item:
+    """What touches with a round rim: a disc about its hinge, or about the axis of its inertia; a ball where that has none."""
+    color, name, radius, centre = color_of_body(body), m.bodies[body], m.wheels[body], m.centre(body)
+    half = max(0.12 * radius, 0.5 * r)
+    for ref, point, joint in held:
+        if joint >= 0 and m.joints[joint][3] == "revolute" and np.linalg.norm(point - centre) < 0.1 * radius:
+            return Item("disc", (ref,), (radius, half), color, name, axis=joint)
+    _, moments = m.moments(body)
+    axis = np.array([0.0, 0.0, 1.0])
+    if not m.planar:
+        sides, axes = _principal(moments, 1.0)
+        alike = [abs(sides[i] - sides[j]) < 0.01 * sides.max() for i, j in ((1, 2), (2, 0), (0, 1))]
+        if all(alike) or not any(alike):
+            return Item("ball", ((body, *centre),), (radius,), color, name)
+        axis = axes[:, alike.index(True)]
+    return Item("rod", ((body, *(centre - half * axis)), (body, *(centre + half * axis))), (radius, radius), color, name)
+
+
+def _cornered(m: Mechanism, body: int, r: float) -> Item:
+    """A body that touches with several corners and has no joint: the box around its centre of mass that reaches to them."""
+    centre = m.centre(body)
+    half = np.abs([corner - centre for owner, corner in m.corners if owner == body]).max(axis=0)
+    size = np.maximum(half, min(r, 0.3 * float(half.max())))
+    return Item("box", ((body, *centre),), tuple(float(s) for s in size), color_of_body(body), m.bodies[body],
+                turn=tuple(np.eye(3).ravel()))
 
 
 def _distance_to_line(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:

@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.jointed import carriers
 from symdyn.pictures.looks import GROUND, Mechanism, Ref
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
+
+
+# Times at which is looked where contacts are; what stays where it is, of how far all goes.
+_SAMPLES, _SAME = 40, 1e-6
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,38 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
     found = Mechanism(about.bodies, start, at("positions", 3), [(n, *ends, kind) for n, ends, kind in names], points,
                       at("joint_axes", 3), about.connections, at("spring_points", 6),
                       inertia if len(inertia) == len(start) else None, about.planar, about.down, frozenset(drawn), tips)
-    return replace(found, travels=_travels(found, frames))
+    corners, wheels = _touching(solution, found, frames)
+    return replace(found, travels=_travels(found, frames), corners=corners, wheels=wheels)
+
+
+def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:
+    """Points of contacts that stay where they are on a body, and distances that they keep from the centre of mass of one; of
+    several bodies the one that is nearest."""
+    if POINTS not in solution.module.functions:
+        return [], {}
+    some = np.unique(np.linspace(0, len(frames) - 1, _SAMPLES).astype(int))
+    at = solution.rows(POINTS).reshape(len(frames), -1, 2, 3)[some][:, :, 0]
+    origins, rotations = frames[some, :, :3], frames[some][..., 3:].reshape(len(some), len(m.bodies), 3, 3)
+    own = np.array([m.centre(body) for body in range(len(m.bodies))])
+    centres = origins + np.einsum("tbij,bj->tbi", rotations, own)
+    near = _SAME * float(np.ptp(np.concatenate([centres.reshape(-1, 3), at.reshape(-1, 3)]), axis=0).max(initial=0.0))
+    corners: list[tuple[int, np.ndarray]] = []
+    wheels: dict[int, float] = {}
+    for place in at.transpose(1, 0, 2):
+        if not np.isfinite(place).all():
+            continue
+        local = np.einsum("tbji,tbj->tbi", rotations, place[:, None] - origins)
+        away = np.linalg.norm(place[:, None] - centres, axis=2)
+        fixed, round_ = np.ptp(local, axis=0).max(axis=1) <= near, np.ptp(away, axis=0) <= near
+        # At rest every point stays on every body: a corner is no rim.
+        choice = fixed if fixed.any() else round_
+        if choice.any():
+            body = int(np.where(choice, away[0], np.inf).argmin())
+            if fixed.any():
+                corners.append((body, local[0, body]))
+            else:
+                wheels[body] = float(away[:, body].mean())
+    return corners, wheels
 
 
 def _travels(m: Mechanism, frames: np.ndarray) -> Sequence[tuple[float, float]]:

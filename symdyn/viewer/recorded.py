@@ -8,6 +8,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
+from symdyn.pictures.arrows import LENGTH, LONGEST, floor_of, names_of, touching, usual
 from symdyn.pictures.bending import bendings
 from symdyn.pictures.mechanism import Hung, mechanism_of
 from symdyn.pictures.panels import panels_of
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 _SEEN, _TURN = 1.5e-3, 3e-3
 # Rows of a motion, and of its curves, at most.
 _MOST, _CURVES = 40_000, 2_000
-_FIXED = 1e-6
+# Contacts at heights that differ by less touch a flat ground; of the mechanism's length.
+_FLAT = 1e-3
 
 
 def view(solution: Solution, path: Any = None, compare: Any = None, forces: bool = False) -> View:
@@ -71,6 +73,12 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
         found = solution.rows("reactions").reshape(n_t, -1, 6)[order][rows][..., :3]
         scene["forces"] = {"joints": list(about.reactions), "values": packed(np.nan_to_num(found).reshape(len(rows), -1)),
                            "largest": float(np.abs(np.nan_to_num(found)).max(initial=0.0))}
+    at, pushes = touching(solution)
+    if at.shape[1] and usual(pushes):
+        both = np.nan_to_num(np.concatenate([at, pushes], axis=2)[order][rows])
+        scene["contacts"] = {"names": names_of(solution), "values": packed(both.reshape(len(rows), -1)), "usual": usual(pushes),
+                             "length": LENGTH, "longest": LONGEST}
+        scene["ground"] = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
     return scene
 
 

@@ -73,8 +73,10 @@ function toolbar(parent, stage, live) {
     choice(parent, "follow ", [[-1, "nothing"], ...bodies], k => stage.setFollow(k));
     if (live) return;
     choice(parent, "trail ", [[-2, "none"], [-1, "all"], ...bodies], k => { stage.trail = k; stage.invalidate(); });
-    if (!stage.scenes.some(s => s.source.forces)) return;
-    layer("forces", "forces");
+    const some = name => stage.scenes.some(s => s.source[name]);
+    if (!some("forces") && !some("contacts")) return;
+    if (some("forces")) layer("forces", "forces in joints");
+    if (some("contacts")) layer("contacts", "contacts");
     slider(parent, { name: "length of arrows", least: 0.1, most: 4, value: 1 }, (v, show) => { stage.forceScale = v; show(v); stage.invalidate(); });
 }
 

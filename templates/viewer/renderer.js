@@ -100,6 +100,9 @@ class Renderer {
         gl.uniform3fv(this.at.light, light);
     }
 
+    // Whether what follows is drawn over all that is there.
+    over(on) { on ? this.gl.disable(this.gl.DEPTH_TEST) : this.gl.enable(this.gl.DEPTH_TEST); }
+
     // flat: 0 by normals, 1 by faces, 2 without light.
     draw(mesh, model, stretch, color, taper = 1, flat = 0, alpha = 1) {
         const gl = this.gl, at = this.at;

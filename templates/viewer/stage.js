@@ -14,7 +14,7 @@ class Stage {
         this.ahead = this.planar ? [0, 0, 1] : Math.abs(this.up[0]) > 0.9 ? [0, 1, 0] : [1, 0, 0];
         this.side = cross(this.up, this.ahead);
         this.length = Math.max(...scenes.map(s => s.data.length));
-        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true };
+        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true, contacts: true };
         this.forceScale = 1;
         this.follow = -1;
         this.trail = -2;
@@ -68,7 +68,8 @@ class Stage {
         }).flat();
         const low = [0, 1, 2].map(k => all.reduce((m, p) => Math.min(m, p[k]), Infinity));
         const high = [0, 1, 2].map(k => all.reduce((m, p) => Math.max(m, p[k]), -Infinity));
-        this.floor = all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
+        const ground = this.scenes[0].data.ground;
+        this.floor = ground ?? all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
         this.radius = Math.max(0.5 * size(minus(high, low)), 0.25 * this.length);
         this.camera = { target: times(add(low, high), 0.5), distance: 1, azimuth: this.planar ? 0 : -0.95, elevation: this.planar ? 0 : 0.34 };
         const aspect = Math.max(0.1, this.canvas.clientWidth / this.scenes.length / (this.canvas.clientHeight || 1));
@@ -148,6 +149,7 @@ class Stage {
             if (!data.water) renderer.draw(scene.floor, placed(this.ahead, this.side, this.up, place, unitScale), unitScale,
                 dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], 1, 2);
         }
+        if (this.planar && data.ground !== undefined && data.ground !== null) this.drawGround(dark);
         for (const item of scene.items) if (!item.layer || (this.layers[item.layer] && item.kind !== "ellipsoid")) this.drawItem(scene, item);
         for (const mesh of scene.meshes) this.drawMesh(scene, mesh);
         if (this.layers.frames) for (let k = 0; k < source.bodies; k++) AXES.forEach(([name, color], i) => {
@@ -156,7 +158,6 @@ class Stage {
             this.rod(scene, source.world(k, 0, 0, 0), source.world(k, ...e), [0.005 * this.length, 0.005 * this.length], colorOf(color),
                 `${name} axis of ${data.bodies[k]}`);
         });
-        if (this.layers.forces && source.force) this.drawForces(scene);
         this.drawTrails(scene);
         if (this.layers.inertia) for (const item of scene.items) if (item.kind === "ellipsoid") this.drawItem(scene, item);
         if (data.water) {
@@ -165,6 +166,8 @@ class Stage {
             renderer.draw(library.box, placed([1, 0, 0], [0, 1, 0], [0, 0, 1], [(x0 + x1) / 2, (y0 + y1) / 2, w.level],
                 [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length]), unitScale, colorOf(w.color), 1, 2, 0.4);
         }
+        if (this.layers.forces && source.force) this.drawForces(scene);
+        if (this.layers.contacts && source.touch) this.drawContacts(scene);
     }
 
     rod(scene, a, b, radii, color, name, mesh = "rod") {
@@ -248,16 +251,38 @@ class Stage {
         this.renderer.change(mesh.made, mesh.vertices);
     }
 
+    // The flat ground of a plane, seen from its edge.
+    drawGround(dark) {
+        const thick = 0.02 * this.length, wide = 4 * this.radius, one = [wide, thick, thick];
+        const middle = add(this.home.target, this.up, this.floor - thick - inner(this.home.target, this.up));
+        this.renderer.draw(this.library.box, placed(cross(this.up, this.ahead), this.up, this.ahead, middle, one), one,
+            dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
+    }
+
     drawForces(scene) {
         const { source, data } = scene, scale = 0.35 * this.length * this.forceScale / (data.forces.largest || 1), color = colorOf("#B45309");
-        data.forces.joints.forEach((name, j) => {
-            const f = source.force.slice(3 * j, 3 * j + 3), n = size(f);
-            if (n * scale < 0.01 * this.length) return;
-            const a = source.at(2 * j + 1), b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5);
-            const neck = add(b, f, -scale * head);
-            this.rod(scene, a, neck, [r, r], color, `force of ${name}: ${n.toPrecision(4)} N`);
-            this.rod(scene, neck, b, [2.4 * r, 0.01 * r], color);
+        data.forces.joints.forEach((name, j) => this.arrow(scene, source.at(2 * j + 1), source.force.slice(3 * j, 3 * j + 3), scale, color,
+            `force of ${name}`));
+    }
+
+    // Forces of contacts on their first bodies; the usual one has the same length as in stills.
+    drawContacts(scene) {
+        const { source, data } = scene, { names, usual, length, longest } = data.contacts, color = colorOf("#D55E00");
+        names.forEach((name, k) => {
+            const at = source.touch.slice(6 * k, 6 * k + 3), f = source.touch.slice(6 * k + 3, 6 * k + 6), n = size(f);
+            if (n > 0) this.arrow(scene, at, f, length * this.length * this.forceScale * Math.min(1 / usual, longest / n), color, `contact ${name}`);
         });
+    }
+
+    arrow(scene, a, f, scale, color, name) {
+        const n = size(f);
+        if (n * scale < 0.01 * this.length) return;
+        const b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5), neck = add(b, f, -scale * head);
+        // Nothing hides a force.
+        this.renderer.over(true);
+        this.rod(scene, a, neck, [r, r], color, `${name}: ${n.toPrecision(4)} N`);
+        this.rod(scene, neck, b, [2.4 * r, 0.01 * r], color);
+        this.renderer.over(false);
     }
 
     drawTrails(scene) {

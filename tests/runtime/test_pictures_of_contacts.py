@@ -1,5 +1,8 @@
 """Contacts in pictures: points and forces as arrows, and marks where modes change."""
 
+import base64
+import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,8 @@ import symdyn as sd
 from symdyn.pictures import arrows
 from symdyn.pictures.bodies import FORCE
 from symdyn.pictures.drawing import Drawing
+from symdyn.pictures.looks import looks_of
+from symdyn.pictures.mechanism import mechanism_of
 
 G = 9.81
 
@@ -80,3 +85,40 @@ def test_forces_are_the_same_in_every_formulation(formulation: str) -> None:
     found = equations.compile().simulate((0, 0.1), rtol=1e-10)
     _, forces = arrows.touching(found)
     assert forces[-1] == pytest.approx(np.array([[0, 2 * G - 1, 0], [0, 1, 0]]), rel=1e-6)
+
+
+def test_bodies_reach_to_the_corners_and_rims_that_they_touch_with(landing: Any) -> None:
+    """A box of two corners is as large as they say, whatever its inertia; a wheel has the radius of its rim."""
+    frames = landing.rows("frames").reshape(len(landing.t), -1, 12)
+    mechanism = mechanism_of(landing, frames, 0)
+    assert [body for body, _ in mechanism.corners] == [0, 0] and not mechanism.wheels
+    items = [item for item in looks_of(mechanism)[0] if not item.layer]
+    assert [item.kind for item in items] == ["box"] and items[0].size[:2] == pytest.approx((0.2, 0.1))
+    system = sd.System("wheel", gravity=[0, -G])
+    body = system.add_body("wheel", mass=2.0, inertia=0.03)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_contact(sd.Contact("rim", body, system.ground, shape=sd.contacts.Sphere(0.3), friction=0.4))
+    rolls = system.compile(backend="numpy").simulate((0, 0.5), q={"y": 0.3}, u={"x_dot": 1.0})
+    mechanism = mechanism_of(rolls, rolls.rows("frames").reshape(len(rolls.t), -1, 12), 0)
+    assert mechanism.wheels == pytest.approx({0: 0.3}) and not mechanism.corners
+    (rod,) = [item for item in looks_of(mechanism)[0] if not item.layer]
+    assert rod.kind == "rod" and rod.size == pytest.approx((0.3, 0.3))
+
+
+def test_flat_ground_is_drawn_where_it_is_touched(landing: Any) -> None:
+    drawing = Drawing.of(landing)
+    assert drawing is not None and drawing.ground == pytest.approx(0.0, abs=1e-9)
+    strip = landing.picture(1.0).axes[0].patches[0]
+    low, high = sorted((strip.get_y(), strip.get_y() + strip.get_height()))
+    assert high == pytest.approx(0.0, abs=1e-9) and low < -0.001
+
+
+def test_pages_carry_the_forces_of_contacts(landing: Any) -> None:
+    """As they are at the stored times, to sixteen bits."""
+    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', landing.view().html, re.S)[1])["motions"][0]  # type: ignore[index]
+    contacts = data["contacts"]
+    assert contacts["names"] == ["left", "right"] and data["ground"] == pytest.approx(0.0, abs=1e-9)
+    packed = contacts["values"]
+    columns = np.frombuffer(base64.b64decode(packed["data"]), "<u2").reshape(packed["columns"], -1)
+    last = np.array(packed["low"]) + np.array(packed["step"]) * columns[:, -1]
+    assert last.reshape(2, 2, 3)[:, 1].sum(axis=0) == pytest.approx([0, 2 * G, 0], abs=2e-3)
