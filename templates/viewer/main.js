@@ -1,4 +1,6 @@
 // Puts the page together.
+// Milliseconds between numbers next to the curves while a motion plays.
+const BETWEEN_NUMBERS = 120;
 function start() {
     const page = JSON.parse(document.getElementById("data").textContent);
     const find = id => document.getElementById(id);
@@ -112,7 +114,7 @@ function liveControls(parent, stage, scene, say) {
 
 function playControls(parent, below, stage, scenes, say) {
     const first = Math.min(...scenes.map(s => s.source.t[0])), last = Math.max(...scenes.map(s => s.source.t[s.source.t.length - 1]));
-    let now = first, playing = false, speed = 1, before = 0, loop = true;
+    let now = first, playing = false, speed = 1, before = 0, written = 0, loop = true;
     const plots = [];
     scenes.forEach((scene, k) => {
         const box = element(below, "section");
@@ -128,17 +130,19 @@ function playControls(parent, below, stage, scenes, say) {
     const rate = choice(parent, "speed ", rates.map(v => [v, `${v} ×`]), v => { speed = v; });
     rate.value = "1";
     check(parent, "repeat", loop, on => { loop = on; });
-    function seek(time) {
+    function seek(time, quick = false) {
         now = time;
         for (const { source } of scenes) source.seek(Math.max(source.t[0], Math.min(source.t[source.t.length - 1], time)));
         bar.show(time);
-        for (const plot of plots) plot.seek(time);
+        for (const plot of plots) plot.seek(time, quick);
         stage.invalidate();
     }
     function pause() {
+        const was = playing;
         playing = false;
         play.textContent = "▶";
         play.setAttribute("aria-label", play.title = "Play");
+        if (was) seek(now);
     }
     function go() {
         if (now >= last) now = first;
@@ -156,7 +160,9 @@ function playControls(parent, below, stage, scenes, say) {
                 if (!loop) pause();
                 time = loop ? first + (time - last) % (last - first || 1) : last;
             }
-            seek(time);
+            const quick = playing && clock - written < BETWEEN_NUMBERS;
+            seek(time, quick);
+            if (!quick) written = clock;
         }
         before = clock;
         if (playing) requestAnimationFrame(step);

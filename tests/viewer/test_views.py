@@ -222,6 +222,51 @@ def test_ten_minutes_of_the_turbine() -> None:
 # -- the page as a page
 
 
+def test_forces_of_contacts_can_be_seen_and_hidden(chromium: Any, tmp_path: Path) -> None:
+    """A box that has come to rest on its corners: two arrows, with their names under the pointer; the ground stays."""
+    system = sd.System("box", gravity=[0, -9.81])
+    body = system.add_body("box", mass=2.0, inertia=0.03)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    for name, x in (("left", -0.2), ("right", 0.2)):
+        system.add_contact(sd.Contact(name, body, system.ground, shape=sd.contacts.Point([x, -0.1]), friction=0.4))
+    system.compile(backend="numpy").simulate((0, 0.4), q={"y": 0.11}).view(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        opened.slide("t", 0.4)
+        shown = opened.pixels()
+        opened.page.click("text=contacts")
+        assert (opened.pixels() != shown).any(axis=1).sum() > 50
+        opened.page.click("text=contacts")
+        assert (opened.pixels() == shown).all()
+        # In the middle of the arrow, 0.22 of the length above the corner.
+        name = opened.page.evaluate("""() => { const s = symdyn.stage, at = symdyn.scenes[0].source.touch.slice(0, 3);
+            return s.pick(...s.project([at[0], at[1] + 0.1 * s.length, at[2]])); }""")
+        assert name == "contact left: 9.810 N"
+
+
+def test_fingers_turn_and_zoom(arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    """One finger turns the picture; two that part come nearer."""
+    arm.view(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html", 400) as opened:
+        send = """([kind, id, x, y]) => { const box = symdyn.stage.canvas.getBoundingClientRect();
+            symdyn.stage.canvas.setPointerCapture = () => {};
+            symdyn.stage.canvas.dispatchEvent(new PointerEvent(kind, { pointerId: id, pointerType: "touch", clientX: box.left + x,
+                clientY: box.top + y, buttons: 1, bubbles: true, cancelable: true })); }"""
+
+        def touch(*moves: tuple[str, int, float, float]) -> dict[str, float]:
+            for move in moves:
+                opened.page.evaluate(send, list(move))
+            found: dict[str, float] = opened.page.evaluate("({...symdyn.stage.camera})")
+            return found
+
+        before = touch()
+        turned = touch(("pointerdown", 1, 100, 100), ("pointermove", 1, 150, 120))
+        assert turned["azimuth"] != before["azimuth"] and turned["distance"] == before["distance"]
+        near = touch(("pointerdown", 2, 170, 120), ("pointermove", 2, 190, 120))
+        assert near["distance"] == pytest.approx(turned["distance"] / 2) and near["azimuth"] == turned["azimuth"]
+        touch(("pointerup", 1, 150, 120), ("pointerup", 2, 190, 120))
+        assert opened.page.evaluate("getComputedStyle(symdyn.stage.canvas).touchAction") == "none"
+
+
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("wide", [1280, 400])
 def test_nothing_is_wider_than_its_box(wide: int, dark: bool, arm: Solution, chromium: Any, tmp_path: Path) -> None:
