@@ -68,6 +68,16 @@ class Mechanism:
                                                                 self.spring_points)])
 
     @property
+    def carriers(self) -> frozenset[int]:
+        """Bodies without mass that only slide and carry what slides: a way to write down how something moves freely."""
+        found = set()
+        for body, inertia in enumerate(self.inertia if self.inertia is not None else ()):
+            kinds = [kind for _, *ends, kind in self.joints if body in map(self.index, ends)]
+            if len(kinds) > 1 and all(kind in _SLIDING for kind in kinds) and not inertia.any():
+                found.add(body)
+        return frozenset(found)
+
+    @property
     def up(self) -> tuple[float, float, float]:
         return up_of(self.down, self.planar)
 
@@ -146,9 +156,10 @@ def looks_of(m: Mechanism) -> tuple[list[Item], float]:
     """The solids of a mechanism, and its length, m."""
     length = _length(m)
     r = _RADIUS * length * (1.0 if len(m.bodies) <= 8 else 0.7)
-    items = [*_joints(m, r, length), *_springs(m, r)]
+    carriers = m.carriers
+    items = [*_joints(m, r, length, carriers), *_springs(m, r)]
     for body in range(len(m.bodies)):
-        if body not in m.drawn:
+        if body not in m.drawn and body not in carriers:
             items += [replace(item, body=body) for item in _body(m, body, r, length)]
         items += [replace(item, body=body) for item in _on_request(m, body, r, length)]
     return items, length
@@ -170,12 +181,14 @@ def color_of_body(body: int) -> str:
     return METAL if body == GROUND else PALETTE[body % len(PALETTE)]
 
 
-def _joints(m: Mechanism, r: float, length: float) -> Iterator[Item]:
+def _joints(m: Mechanism, r: float, length: float, carriers: frozenset[int]) -> Iterator[Item]:
     """Joints as their kind, and stands where the ground holds them."""
     for j, (name, parent, child, kind) in enumerate(m.joints):
         ends = (m.index(parent), m.index(child))
         title = f"{name} ({kind})"
         if kind in _FLOATING or kind == "fixed" or all(end == GROUND or end in m.drawn for end in ends):
+            continue
+        if carriers.intersection(ends):
             continue
         own = replace(Item(kind, (2 * j + 1,), (r, r), DARK, title), axis=j, body=ends[1])
         if kind == "rod":
@@ -233,7 +246,7 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
         half = min(float(np.sqrt(3 * np.linalg.eigvalsh(moments)[-1])), 1.1 * distance)
         return [Item("rod", (ref, (body, *(centre + half * along))), (r, 0.65 * r), color, name)]
     if not extended:
-        slides = joint >= 0 and m.joints[joint][3] in _SLIDING
+        slides = joint >= 0 and m.joints[joint][3] in _SLIDING and not m.carriers.intersection(map(m.index, m.joints[joint][1:3]))
         return [] if slides else [replace(sphere, size=(2.0 * r,))]
     axis = m.local(body, m.frames[body, :3] + m.joint_axes[joint]) if joint >= 0 else np.zeros(3)
     if joint >= 0 and m.joints[joint][3] == "revolute" and axis @ moments @ axis > 0.4 * np.trace(moments):

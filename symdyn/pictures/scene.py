@@ -81,7 +81,7 @@ class Scene(PolyCollection):
                 else:
                     for pieces, points in zip((low, high), cut(places[vertices], level), strict=True):
                         pieces.add(camera.project(points), color, width)
-        surface = _Pieces(self._opacity * _WATER_ALPHA)
+        surface = _Pieces(1.0, self._opacity * _WATER_ALPHA)
         if water is not None:
             surface.add(camera.project(self._surface(water)), np.array(water.color), 0.8)
         above = camera.eye[2] > level * camera.eye[3] if water is not None else True
@@ -108,17 +108,18 @@ def _facing(right: int, upward: int, up: np.ndarray) -> Camera:
 
 
 class _Pieces:
-    """Polygons of the screen with their colours and the widths of their edges."""
+    """Polygons of the screen with their colours and the widths of their edges; pale: what is left of the colours on white."""
 
-    def __init__(self, alpha: float) -> None:
-        self.alpha = alpha
+    def __init__(self, pale: float, alpha: float = 1.0) -> None:
+        self.pale, self.alpha = pale, alpha
         self.polygons: list[np.ndarray] = []
         self.colors: list[tuple[float, ...]] = []
         self.widths: list[float] = []
 
     def add(self, polygon: np.ndarray, color: np.ndarray, width: float) -> None:
         self.polygons.append(polygon)
-        self.colors.append((*color, self.alpha))
+        # Pale is mixed with the paper: through what is half transparent its own back would be seen.
+        self.colors.append((*(1 - self.pale * (1 - color)), self.alpha))
         self.widths.append(width)
 
 

@@ -106,3 +106,17 @@ def test_joint_axes_and_spring_ends_are_functions() -> None:
         np.testing.assert_allclose(axes[0], [0, 0, 1], atol=1e-13)
         np.testing.assert_allclose(axes[2], axes[1], atol=1e-13)
         assert abs(axes[1] @ axes[0]) < 1e-13
+
+
+def test_bodies_without_mass_that_only_slide_are_no_rails() -> None:
+    """A hip that two sliders let move freely in its plane, with a leg: of the carrier between them nothing is seen."""
+    x, y, q = sd.coordinates("x y q")
+    system = sd.System("hip", gravity=[0, -9.81])
+    carrier, hip, leg = system.add_body("carrier"), system.add_body("hip", mass=1), system.add_body("leg", mass=1, com=[0, -1])
+    system.add_joint(sd.Prismatic("along", system.ground, carrier, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("across", carrier, hip, axis=[0, 1], coordinate=y))
+    system.add_joint(sd.Revolute("joint", hip, leg, coordinate=q))
+    mechanism, _ = mechanism_of(system.check())
+    assert mechanism.carriers == {0}
+    items = [item for item in looks_of(mechanism)[0] if not item.layer]
+    assert sorted(item.kind for item in items) == ["ball", "ball", "pin", "rod"]
