@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 
 CLOSES, OPENS, STICKS, SLIPS, TURNS, IGNORED, COUNTS = "closes", "opens", "sticks", "slips", "turns", "ignored", "counts"
 TOUCHES, RELEASES = "touches", "releases"  # of compliant contacts
-# A speed, m/s, with which the direction of friction is still known where a contact begins to slip.
-SLOW = sp.Rational(1, 10**12)
+# A speed, m/s, that is added to the slip along the direction which friction in space is written by: a large one holds that
+# direction, a small one lets friction act against the slip.
+HOLDING, SLOW = sp.Symbol("contacts_holding", real=True), 1e-12
 # Added to the diagonal of the rows that hold, by their size, where they depend on each other.
 SOFTNESS = sp.Symbol("contacts_shared", real=True)
 
@@ -138,6 +139,9 @@ def with_contacts(system: System) -> System:
     if result.rigid_contacts:
         added = [SOFTNESS, *[s for c in result.rigid_contacts for s in (*c.switches, *c.sliding)]]
         result.defaults.update(dict.fromkeys(added, 0.0))
+        if any(len(c.sliding) == 2 for c in result.rigid_contacts):
+            added.append(HOLDING)
+            result.defaults[HOLDING] = SLOW
         if system.declared is not None:
             result.declared = (*system.declared, *added)
     return result
@@ -224,7 +228,8 @@ def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],
     """Tangential forces by the normal force, and the events of sliding.
 
     In a plane friction is along the given direction. In space it is against the slip, written by its parts a along and b across
-    the given direction as (d + (b/a) d')/sqrt(1 + (b/a)^2), which goes on smoothly where a slip along a line passes zero.
+    the given direction as (d + (b/a) d')/sqrt(1 + (b/a)^2), which goes on smoothly where a slip along a line passes zero. Where
+    a contact begins to slip a is zero; HOLDING is then large, and friction along d.
     """
     if not slips:
         return (), {}
@@ -232,7 +237,7 @@ def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],
         return (-kinetic * sliding[0],), {STICKS: sliding[0] * slips[0]}
     (x, y), (v, w) = sliding, slips
     along, across = v * x + w * y, w * x - v * y
-    ratio = across / (along + SLOW)
+    ratio = across / (along + HOLDING)
     size = sp.sqrt(1 + ratio**2)
     forces = (-kinetic * (x - ratio * y) / size, -kinetic * (y + ratio * x) / size)
     return forces, {STICKS: along, TURNS: along**2 - across**2}

@@ -24,6 +24,7 @@ from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, d
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
+from symdyn.runtime.integrating.slip_begins import SlipBegins
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.stronge import stronge
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 Part = Callable[[Request, bool, bool], Outcome]
-CONTACTS, SHARED = "contacts", "contacts_shared"
+CONTACTS, SHARED, HOLDING = "contacts", "contacts_shared", "contacts_holding"
 # Gaps, m, and velocities, m/s, that count as none at the start.
 TOUCHING = 1e-9
 # Gaps, by the size of the state, that close together with another contact.
@@ -51,8 +52,8 @@ SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
-# The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
-SLIP_GRACE = 1e-5
+# A speed, m/s, that no slip comes near: added to the slip it holds the direction of friction.
+HOLDS = 1e30
 # Part of a phase of sliding in space before its end in which errors of sensitivities are not controlled, and a tolerance that no
 # error comes near.
 LAST_STRETCH, ANY = 1e-4, 1e300
@@ -283,7 +284,7 @@ class _Phases:
         self.passed = [False] * n  # whether an open contact is ignored
         self.size = 0.0  # of coordinates and gaps
         self.latest_numbers: tuple[tuple[float, bytes, bytes], Numbers] | None = None  # and what they are of
-        self.fresh = [False] * n  # whether it has just begun to slip
+        self.begins = SlipBegins(self.request.span[1] - self.request.span[0])
         self.most_kinetic: float | None = None  # energy, once it was looked at
         self.shared = False
         begin, end = self.request.span
@@ -328,7 +329,7 @@ class _Phases:
                 elif until >= last:
                     break
                 else:
-                    fired = self._back(until, x)
+                    x, fired = self._slipped(until, x)
                 self._count(until - start, until, fired)
                 t = until
                 if request.max_steps is not None and self.n_steps >= request.max_steps:
@@ -368,6 +369,13 @@ class _Phases:
     def _phase(self, t: float, x: np.ndarray) -> Outcome:
         """From one switch to the next."""
         request = self.request
+        held, stiff, first = bool(self.begins.directions), False, 0.0
+        if held:
+            self.until = min(self.until, self._held_until(t, x))
+        elif self.begins.since:
+            stiff = True
+            piece, first = self.begins.piece(t)
+            self.until = min(self.until, piece)
         end = min(request.span[1], self.until)
         wanted, times = None, None
         if request.times is not None:
@@ -377,11 +385,9 @@ class _Phases:
         p = self._parameters()
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
-        stiff = self._stiff()
-        if request.columns and self._in_space():
+        if request.columns and self._in_space() and not held:
             part = self._towards_sticking(t, part)
-        outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff,
-                            all(mode == OPEN for mode in self.modes))
+        outcome = self.part(replace(part, first_step=first) if stiff else part, stiff, all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
         if wanted is not None:
             rows = np.isin(outcome.t, wanted)
@@ -417,10 +423,31 @@ class _Phases:
         wanted = None if part.times is None else part.times[part.times < self.until]
         return replace(part, span=(t, self.until), times=None if wanted is None else np.append(wanted, self.until))
 
-    def _stiff(self) -> bool:
-        """Whether the direction of friction is all but free: a contact in space begins to slip."""
-        return any(fresh and mode == SLIDING and record.tangents == 2
-                   for fresh, mode, record in zip(self.fresh, self.modes, self.records, strict=True))
+    def _held_until(self, t: float, x: np.ndarray) -> float:
+        """Until when the directions of contacts that begin to slip are held."""
+        request, p, n = self.request, self._parameters(), self.request.n_state
+
+        def rate(t: float, x: np.ndarray) -> np.ndarray:
+            found: np.ndarray = self.module.evaluate("rhs", t, x, p, request.inputs.at(t, x))
+            return found
+
+        def slips(t: float, x: np.ndarray) -> dict[int, np.ndarray]:
+            found = numbers(self.module, t, x, p, request.inputs.at(t, x)).slip
+            return {k: found[self.tangents[k]] for k in self.begins.directions}
+
+        tolerated = max(self._tolerated(t, x, k) for k in self.begins.directions)
+        return self.begins.held_until(t, x[:n], rate, slips, tolerated)
+
+    def _tolerated(self, t: float, x: np.ndarray, k: int) -> float:
+        """The error of the slip of a contact that the tolerances of the speeds let pass."""
+        sizes, request = self.module.metadata.sizes, self.request
+        at, found = self._numbers(t, x).slip[self.tangents[k]], 0.0
+        for j in range(sizes.q, sizes.q + sizes.u):  # slips are linear in the speeds
+            moved = x[:request.n_state].copy()
+            moved[j] += 1.0
+            by = numbers(self.module, t, moved, request.p, request.inputs.at(t, x[:request.n_state])).slip[self.tangents[k]] - at
+            found += float(np.linalg.norm(by)) * (float(request.atol[j]) + request.rtol * abs(float(x[j])))
+        return found
 
     def _parameters(self) -> np.ndarray:
         """The parameters with the modes of all contacts."""
@@ -433,6 +460,8 @@ class _Phases:
                 for name, value in zip(record.sliding, direction, strict=True):
                     p[self.place[name]] = value if mode == SLIDING else 0.0
         p[self.place[SHARED]] = SOFTNESS if self.shared else 0.0
+        if self.begins.directions and HOLDING in self.place:
+            p[self.place[HOLDING]] = HOLDS
         return p
 
     def _looked_for(self) -> np.ndarray:
@@ -440,15 +469,17 @@ class _Phases:
         request = self.request
         n = len(self.module.metadata.events)
         look = np.zeros(n, dtype=bool) if request.look is None else request.look.copy()
-        for own, mode, record, passed in zip(self.events, self.modes, self.records, self.passed, strict=True):
+        held = self.begins.directions
+        for j, (own, mode, passed) in enumerate(zip(self.events, self.modes, self.passed, strict=True)):
             wanted = {OPEN: (COUNTS,) if passed else ("closes", IGNORED), STICKING: ("opens", "slips"),
                       SLIDING: ("opens", "sticks", "turns")}[mode]
             for what, k in own.items():
                 look[k] = what in wanted and k not in self.unlooked
-            if mode == SLIDING and record.sticking and not self.directions[self.records.index(record)].any():
-                for what in ("sticks", "turns"):
-                    if what in own:
-                        look[own[what]] = False
+            directed = mode == SLIDING and self.directions[j].any()
+            if "sticks" in own and (held or not directed):
+                look[own["sticks"]] = False
+            if "turns" in own and (held or not directed or j in self.begins.since):
+                look[own["turns"]] = False
         return look
 
     # -- switches
@@ -515,11 +546,11 @@ class _Phases:
         turned = {k for k, what in fired if what in (IGNORED, COUNTS)}  # where what they are ignored by is at its zero
         self._pass_by(t, x, self._ignored(t, x) if start else [one != (k in turned) for k, one in enumerate(self.passed)])
         for k, what in fired:
-            if what == "sticks":
+            if what == "sticks" and len(self.tangents[k]) == 1:
                 self.still[k] = True
-            elif what == "turns":  # a slip within the tolerances has no direction
+            elif what in ("sticks", "turns"):  # a slip within the tolerances has no direction
                 v = self._numbers(t, x).slip[self.tangents[k]]
-                self.still[k] = bool(np.linalg.norm(v) <= 10 * self.request.atol[:self.request.n_state].max(initial=0.0))
+                self.still[k] = bool(np.linalg.norm(v) <= self._tolerated(t, x, k))
             elif what in ("opens", "slips"):
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         self.made = [Made(tuple(self.modes), tuple(self.still))]
@@ -703,16 +734,16 @@ class _Phases:
                         f"accelerations; {self._named(closed, found[0])} was taken, and a small change of the state may lead "
                         "to another motion")
         self.modes = [OPEN] * len(self.records)
-        self.fresh = [False] * len(self.records)
+        begins = {}
         self.shared = bool(found) and found[0].shared
         for k, mode in zip(closed, found[0].modes if found else (), strict=True):
             self.modes[k] = mode.kind
             self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].tangents)
-            self.fresh[k] = self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0
+            if self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0:
+                begins[k] = self.directions[k]
             self.still[k] = mode.kind == STICKING
-            if self.fresh[k]:  # its slip is zero, and so are what these events look at
-                self.unlooked |= {self.events[k][what] for what in ("sticks", "turns") if what in self.events[k]}
-                self._wait(t, SLIP_GRACE)
+        self.begins.switched(t, begins, {k: record.tangents == 2 for k, record in enumerate(self.records)
+                                         if self.modes[k] == SLIDING})
 
     def _doubt(self, kind: str, t: float, of: Sequence[int], text: str, weight: float = 0.0) -> None:
         """Note what to warn of, with its contacts."""
@@ -726,18 +757,58 @@ class _Phases:
                 doubt.text, doubt.weight = text, weight
         doubt.names |= dict.fromkeys(self.records[k].name for k in of)
 
-    def _wait(self, t: float, part: float = GRACE) -> None:
+    def _wait(self, t: float) -> None:
         """Look for events that are not looked for again after a part of the run."""
         begin, end = self.request.span
-        self.until = t + part * (end - begin)
+        self.until = t + GRACE * (end - begin)
 
-    def _back(self, t: float, x: np.ndarray) -> list[tuple[int, str]]:
-        """Contacts that stick again before their slip was looked at."""
-        if not any(self.fresh):
-            return []
+    def _slipped(self, t: float, x: np.ndarray) -> tuple[np.ndarray, list[tuple[int, str]]]:
+        """The end of a part of a phase that ends where slips have begun: the state, where directions of friction were held with
+        slips along these; contacts that stick again before their slip was looked at."""
+        held, self.begins.directions = self.begins.directions, {}
+        if held:
+            slip = self._numbers(t, x).slip
+            fired = [(k, "sticks") for k, direction in held.items() if slip[self.tangents[k]] @ direction < 0]
+            return (x, fired) if fired else (self._aligned(t, x, held), [])
+        if self.begins.since:
+            at = numbers(self.module, t, x, self._parameters(), self.request.inputs.at(t, x[:self.request.n_state]))
+            turning: dict[int, float] = {}
+            for k in self.begins.since:
+                tangents = self.tangents[k]
+                gain = float(np.linalg.norm(at.D[np.ix_(tangents, tangents)], 2)) * float(np.linalg.norm(at.force[tangents]))
+                turning[k] = gain / max(float(np.linalg.norm(at.slip[tangents])), 1e-300)
+            self.begins.settled(t, turning)
+        return x, []
+
+    def _aligned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray]) -> np.ndarray:
+        """The state after the impulses by which friction that follows the slip differs from friction along held directions:
+        across these, with the normal impulses that keep contacts closed and their friction."""
+        across = {k: np.array([-d[1], d[0]]) for k, d in held.items() if len(d) == 2}
+        closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
+        places = [row for k in closed for row in self.rows[k]]
         at = self._numbers(t, x)
-        return [(k, "sticks") for k in range(len(self.records))
-                if self.fresh[k] and at.slip[self.tangents[k]] @ self.directions[k] < 0]
+        columns, kept = [], []
+        for k in closed if across else ():
+            normal = np.zeros(len(at.slip))
+            if self.records[k].normal:
+                normal[self.normal[k]] = 1.0
+                kept.append(normal)
+                along = normal.copy()
+                if self.modes[k] == SLIDING:
+                    along[self.tangents[k]] = -at.kinetic[k] * self.directions[k]
+                columns.append(along)
+            for direction in [across[k]] if k in across else np.eye(len(self.tangents[k])) if self.modes[k] == STICKING else ():
+                row = np.zeros(len(at.slip))
+                row[self.tangents[k]] = direction
+                columns.append(row)
+                kept.append(row)
+        if not columns:
+            return x
+        H, G = np.array(columns).T[places], np.array(kept)[:, places]
+        impulse = H @ np.linalg.lstsq(G @ at.D[np.ix_(places, places)] @ H, -G @ at.slip[places], rcond=1e-10)[0]
+        n_q, n_u, x = len(at.coordinates), len(at.speeds), x.copy()
+        x[n_q:n_q + n_u] += at.speeds[:, places] @ impulse
+        return x
 
     def _named(self, chosen: Sequence[int], one: Solved) -> str:
         return ", ".join(f"{self.records[k].name} {mode.kind}" for k, mode in zip(chosen, one.modes, strict=True))

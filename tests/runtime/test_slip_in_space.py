@@ -1,0 +1,90 @@
+"""How contacts in space begin to slip and come to stick, with friction whose direction turns."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import symdyn as sd
+from symdyn.runtime.module import Module
+
+MASSES, PRESSED = np.array([6.0, 5.0]), 30.0  # kg along x and along y; N
+
+
+def pushed(t: float) -> np.ndarray:
+    """The force that pushes the skid, N."""
+    return np.array([18 * np.sin(1.3 * t), 9 * np.cos(0.7 * t) + 3 * np.sin(2.1 * t)])
+
+
+def skid(friction: object) -> Module:
+    """A body with different masses along x and y."""
+    system, t = sd.System("skid", gravity=[0, 0, -10]), sd.t
+    bodies = [system.add_body(name, mass=mass, inertia=[1, 1, 1]) for name, mass in zip("abc", (1, 2, 3), strict=True)]
+    carriers = [system.ground, *bodies[:2]]
+    for body, carrier, q, axis in zip(bodies, carriers, sd.coordinates("x y z"), np.eye(3, dtype=int), strict=True):
+        system.add_joint(sd.Prismatic(f"along_{q.name}", carrier, body, axis=axis, coordinate=q))
+    system.add_joint_force("along_x", 18 * sp.sin(1.3 * t))
+    system.add_joint_force("along_y", 9 * sp.cos(0.7 * t) + 3 * sp.sin(2.1 * t))
+    system.add_contact(sd.Contact("sole", bodies[2], system.ground, friction=friction))
+    return system.compile()
+
+
+@cache
+def expected(static: float, kinetic: float) -> tuple[float, float, np.ndarray]:
+    """When the skid begins to slip and when it sticks again, at the latest at 5 s, and where it is then.
+
+    It slips against the direction of the force that held last. Where static friction is left continuously the slip grows as
+    a t^2/2, with the part of the force's rate along that direction; by more friction than acts then, with an acceleration
+    along a direction d of its own, M a d = F - mu_k N d.
+    """
+    begins = brentq(lambda t: np.linalg.norm(pushed(t)) - static * PRESSED, 0, 1, xtol=1e-15)
+    force, rate = pushed(begins), (pushed(begins + 1e-5) - pushed(begins - 1e-5)) / 2e-5
+    if static == kinetic:
+        d, after = force / np.linalg.norm(force), 1e-4
+        jerk = d @ rate / (d @ (MASSES * d))
+        start = np.concatenate([jerk * d * after**3 / 6, jerk * d * after**2 / 2])
+    else:
+        after = 1e-7
+        size = brentq(lambda a: np.linalg.norm(force / (MASSES * a + kinetic * PRESSED)) - 1, 1e-6, 10, xtol=1e-15)
+        d = force / (MASSES * size + kinetic * PRESSED)
+        start = np.concatenate([size * d * after**2 / 2, size * d * after])
+
+    def slides(t: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[2:], (pushed(t) - kinetic * PRESSED * x[2:] / np.linalg.norm(x[2:])) / MASSES])
+
+    def rests(t: float, x: np.ndarray) -> float:
+        return float(np.linalg.norm(x[2:])) - 1e-9
+
+    rests.terminal, rests.direction = True, -1  # type: ignore[attr-defined]
+    found = solve_ivp(slides, (begins + after, 5), start, method="Radau", rtol=1e-11, atol=1e-14, events=rests)
+    return begins, float(found.t[-1]), found.y[:2, -1]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-11])
+@pytest.mark.parametrize("kinetic", [0.4, 0.3])
+def test_a_skid_slips_along_the_force_that_held_it_last(kinetic: float, rtol: float) -> None:
+    """With less kinetic friction it still slips at the end."""
+    begins, until, place = expected(0.4, kinetic)
+    solution = skid((0.4, kinetic)).simulate([0, until, until + 0.02], rtol=rtol, method="dop853")
+    times, modes = zip(*solution.contacts["sole"].switches, strict=True)
+    assert modes == (("sticking", "sliding", "sticking") if kinetic == 0.4 else ("sticking", "sliding"))
+    assert abs(times[1] - begins) < 1e-11 and abs([*times, until][2] - until) < max(20 * rtol, 1e-8)
+    np.testing.assert_allclose(solution.q[1, :2], place, rtol=0, atol=max(20 * rtol, 1e-9))
+
+
+def test_a_disc_that_sticks_and_slips_on_its_edge_is_as_accurate_as_its_tolerance() -> None:
+    """Five times it sticks and slips again; the normal force depends on the direction of friction."""
+    system, radius, tilt = sd.System("disc", gravity=[0, 0, -9.81]), 0.3, 1.1
+    body = system.add_body("disc", mass=1.0, inertia=[radius**2 / 4, radius**2 / 4, radius**2 / 2])
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.Contact("edge", body, system.ground, shape=sd.contacts.Disc(radius), friction=0.25))
+    module = system.compile()
+    start = [0, 0, radius * np.sin(tilt), np.cos(tilt / 2), np.sin(tilt / 2), 0, 0]
+    runs = [module.simulate([0, 3], q=start, u=[0.6, 0, 0, 0, 0, -2], rtol=rtol, method="dop853") for rtol in (1e-6, 1e-8, 1e-11)]
+    assert all(len(run.contacts["edge"].switches) == 11 for run in runs)
+    for run, bound in zip(runs, (1e-5, 1e-7), strict=False):
+        assert run.n_steps < 1500
+        np.testing.assert_allclose(run.q[-1], runs[-1].q[-1], rtol=0, atol=bound)
