@@ -96,6 +96,10 @@ MEASUREMENTS: dict[str, Measurement] = {
             _number("--budget", "budget", "begin nothing new after this time, in which derivation, compilation and the "
                     "search for tolerances count; the same command goes on", float, "SECONDS"),
             _folder("published"), Option("progress", "--progress", {"action": "store_true", "help": "show a bar (needs tqdm)"}))),
+    "contacts": Measurement(
+        "symdyn.lab.contacts:run", "contact by work against error: switches located and time stepping, MuJoCo, Exudyn", (
+            _names("--only", "names", "some of the motions: ball, oscillator, billiard"),
+            _number("--repeats", "repeats", "timed runs, of which the least time counts (default: 3)"), _folder("contacts"))),
     "growth": Measurement(
         "symdyn.lab.growth:run", "how everything grows with the number of bodies: table and picture", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,

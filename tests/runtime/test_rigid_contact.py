@@ -235,6 +235,12 @@ def test_modes_that_do_not_settle_and_impacts_without_solution_stop_the_run(monk
         patched.setattr(contacts, "SAME_TIME", 10.0)
         with pytest.warns(SimulationWarning, match="modes of contacts do not settle: 50 switches within .* of floor.*'moreau'"):
             module.simulate((0, 6), q=[0.5])
+    with monkeypatch.context() as patched:
+        patched.setattr(contacts, "SHORTEST_FLIGHT", 1e-2)
+        patched.setattr(contacts, "MOST_SHORT", 10)
+        patched.setattr(contacts._Phases, "_zeno", lambda *given: [])
+        with pytest.warns(SimulationWarning, match="change 10 times within .* s, .*: floor 10 times; .*; method='moreau'"):
+            module.simulate((0, 6), q=[0.5])
     several = [Solved((Mode(SLIDING, np.zeros(0), True),), np.array([k]), np.array([0.0]), False) for k in (5.0, 4.0)]
     for found, message in (([], "impact of floor has no solution under Coulomb's law and impact='newton'"),
                            (several, "impact of floor at t = 0.319275428 s has 2 solutions")):
@@ -243,6 +249,11 @@ def test_modes_that_do_not_settle_and_impacts_without_solution_stop_the_run(monk
             with pytest.warns(SimulationWarning, match=message):
                 module.simulate((0, 0.4), q=[0.5])
     assert "1 steps were done, as asked" in short(module).message
+
+
+def test_a_ball_that_starts_on_its_floor_downward_bounces() -> None:
+    solution = ball(restitution=0.5).compile().simulate((0, 0.16), u=[-1.0])
+    np.testing.assert_allclose(solution.contacts["floor"].impacts.t, [0, 1 / G, 1.5 / G], rtol=0, atol=1e-13)
 
 
 def short(module: Any) -> Any:

@@ -9,6 +9,7 @@ accelerations.
 from __future__ import annotations
 
 import copy
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -45,8 +46,9 @@ LOWEST_FLIGHT = 1e-12
 MISSED = 1e-6
 # Velocities below this part of those before an impact, or of the largest rate, are none.
 NO_SPEED = 1e-11
-# So many switches within SAME_TIME of the run: the modes do not settle.
-MOST_SWITCHES, SAME_TIME = 50, 1e-13
+# So many switches within SAME_TIME of the run: the modes do not settle. So many that follow each other, in the mean, after less
+# than SHORTEST_FLIGHT of the run do not come to an end.
+MOST_SWITCHES, SAME_TIME, MOST_SHORT = 50, 1e-13, 1000
 # What is added to the diagonal of rows that depend on each other, by its size.
 SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
@@ -290,6 +292,7 @@ class _Phases:
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
         self.at_once, self.latest = 0, ""  # switches without time between, and the contacts of the latest
+        self.recent: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=MOST_SHORT)  # switches with their contacts
         self.ruled_out: dict[int, set[str]] = {}  # modes at this time
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
@@ -315,7 +318,7 @@ class _Phases:
                 if not outcome.success:
                     break
                 start, t, x = t, float(outcome.t[-1]), outcome.x[-1]
-                self._demand_seen(t, x)
+                self._demand_seen(t, x, t - start)
                 latest = [one for one in outcome.happened if one.t == outcome.happened[-1].t] if outcome.happened else []
                 fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
                 if any(self.module.metadata.events[one.event].stop and one.event not in self.of_event for one in latest):
@@ -341,18 +344,29 @@ class _Phases:
             message, cause = describe_stop(self.module.metadata, t, x[:request.n_state], why), error.__cause__
         return self._whole(t, x, message, cause, interrupted, over)
 
-    def _demand_seen(self, t: float, x: np.ndarray) -> None:
-        """Raise _Stop where an open contact overlaps."""
+    def _demand_seen(self, t: float, x: np.ndarray, passed: float) -> None:
+        """Raise _Stop where an open contact overlaps, at the end of a phase."""
         at = self._numbers(t, x)
         for k, (record, mode) in enumerate(zip(self.records, self.modes, strict=True)):
-            size = max(1.0, float(np.abs(at.slip).max())) if k in self.clutches else self.size
+            size = max(1.0, float(np.abs(at.slip).max())) if k in self.clutches else max(
+                self.size, passed * abs(float(at.slip[self.normal[k]])))
             if mode == OPEN and not self.passed[k] and at.gap[k] < -MISSED * size:
                 what = "turns back" if k in self.clutches else "overlaps"
                 raise _Stop(f"contact {record.name} {what} by {-at.gap[k]:.3g}{' m' * (record.kind == BODIES)}, since the "
                             "instant at which it closed was missed; give event_spacing, or a finer rtol")
 
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
-        """Note how often the modes change without time passing; raise _Stop where that does not end."""
+        """Note how often the modes change without time passing, and with less and less; raise _Stop where that does not end."""
+        if fired:
+            self.recent.append((t, tuple(k for k, _ in fired)))
+            begin, end = self.request.span
+            first = self.recent[0][0]
+            if len(self.recent) == MOST_SHORT and t - first < MOST_SHORT * SHORTEST_FLIGHT * (end - begin):
+                often = Counter(self.records[k].name for _, of in self.recent for k in of)
+                raise _Stop(f"the modes of contacts change {MOST_SHORT} times within {t - first:.3g} s, and nothing says when "
+                            f"that ends: {', '.join(f'{name} {n} times' for name, n in often.most_common())}; restitution below "
+                            "1, or a compliant contact where they touch, leaves fewer switches"
+                            + "; method='moreau' with a step goes across them" * (not not_stepped(self.records)))
         if passed > self.same:
             self.at_once, self.ruled_out, self.unlooked, self.until = 0, {}, set(), np.inf
             return
