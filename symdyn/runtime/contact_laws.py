@@ -111,11 +111,61 @@ def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
             found += solutions(D, b, [replace(site, excluded=(*site.excluded, STICKING)) if k in slides else site
                                       for k, site in enumerate(sites)]) if slides else [one]
         return _different(b, found)
+    if _is_simple(sites):
+        return (_one_bounded if sites[0].bounded else _one)(D, b, sites[0])
     options = [list(_options(site)) for site in sites]
     if all(len(site.tangents) < 2 for site in sites) and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS:
         found = [one for one in _Table(D, b, sites, options).solved(list(product(*[range(len(o)) for o in options]))) if one]
     else:
         found = _by_lemke(D, b, sites) or _first(D, b, sites, options)
+    return _different(b, found)
+
+
+def _is_simple(sites: Sequence[Site]) -> bool:
+    """Whether there is one contact only, whose solutions are closed forms of one unknown."""
+    return len(sites) == 1 and (sites[0].bounded or sites[0].slip is not None or not sites[0].tangents)
+
+
+def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
+    """Solutions of one contact whose friction is known, as the tables of combinations find them: the case of nearly all
+    impacts."""
+    k, tangents, slip = site.rows[0], site.tangents, np.zeros(0) if site.slip is None else site.slip
+    column = np.zeros(len(b))
+    column[k] = 1.0
+    column[tangents] = -site.kinetic * slip
+    gain = D @ column
+    size = max(float(np.abs(b).max()), float(np.abs(D[:, k]).max()) * site.least, 1e-300)
+    found = []
+    for mode in _options(site):
+        if mode.kind == OPEN or not mode.held:
+            lam = site.least if mode.kind != OPEN else 0.0
+            w = b + gain * lam
+            if w[k] >= -NOISE * size:
+                found.append(Solved((mode,), column * lam, w, False))
+        elif gain[k] != 0:
+            lam = -float(b[k]) / float(gain[k])
+            w = b + gain * lam
+            w[k] = 0.0
+            force = max(abs(lam) * float(np.abs(column).max()), size / max(float(np.diag(D).max()), 1e-300))
+            if lam >= site.least - NOISE * force:
+                found.append(Solved((mode,), column * lam, w, False))
+    return _different(b, found)
+
+
+def _one_bounded(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
+    """The same of dry friction of one joint."""
+    found = []
+    for mode in _options(site):
+        if mode.kind == STICKING:
+            lam = -float(b[0]) / float(D[0, 0]) if D[0, 0] else 0.0
+            w, good = 0.0 if D[0, 0] else float(b[0]), abs(lam) <= site.static * (1 + NOISE) and (D[0, 0] or b[0] == 0)
+        else:
+            lam = -site.kinetic * float(mode.direction[0])
+            w = float(b[0]) + float(D[0, 0]) * lam
+            size = max(abs(float(b[0])), float(D[0, 0]) * site.static)
+            good = site.slip is not None or w * float(mode.direction[0]) >= -NOISE * size
+        if good:
+            found.append(Solved((mode,), np.array([lam]), np.array([w]), False))
     return _different(b, found)
 
 

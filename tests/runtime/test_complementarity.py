@@ -194,3 +194,26 @@ def test_impacts_of_many_contacts_at_once_lose_energy_in_a_plane_without_frictio
     one = found[0]
     assert one.lam.min() >= -1e-9 and (v + one.w) @ one.lam <= 1e-9
     assert one.w == pytest.approx(v + D @ one.lam, abs=1e-8)
+
+
+def test_single_contacts_are_solved_as_the_tables_of_combinations_solve_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = np.random.default_rng(3)
+    problems = []
+    for _ in range(300):
+        n, bounded = int(stream.integers(1, 3)), bool(stream.integers(2))
+        n = 1 if bounded else n
+        A = stream.normal(size=(n, n))
+        slip = stream.choice([-1.0, 1.0], 1) if (n > 1 or bounded) and (n > 1 or stream.integers(2)) else None
+        kinetic = float(stream.uniform(0, 3))
+        least = 0.0 if bounded else float(stream.choice([0.0, 0.5]))
+        site = Site(tuple(range(n)), kinetic + float(stream.choice([0, 0.3])), kinetic, slip, least, bounded=bounded)
+        problems.append((A @ A.T + 0.1 * np.eye(n), stream.normal(size=n), [site]))
+    quick = [solutions(*problem) for problem in problems]
+    monkeypatch.setattr(contact_laws, "_is_simple", lambda sites: False)
+    for own, problem in zip(quick, problems, strict=True):
+        expected = solutions(*problem)
+        assert [[m.kind for m in one.modes] for one in own] == [[m.kind for m in one.modes] for one in expected]
+        for one, other in zip(own, expected, strict=True):
+            np.testing.assert_allclose(one.lam, other.lam, rtol=0, atol=1e-12 * (1 + np.abs(other.lam).max()))
+            np.testing.assert_allclose(one.w, other.w, rtol=0, atol=1e-12 * (1 + np.abs(other.w).max()))
+    assert {len(own) for own in quick} >= {0, 1, 2}

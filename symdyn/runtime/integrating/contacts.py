@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.backend.metadata import ContactRecord
+from symdyn.backend.metadata import ContactRecord, ModuleMetadata
 from symdyn.contact_kinds import BODIES, CLUTCH, FRICTION
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
@@ -85,9 +85,13 @@ def rows_of(records: Sequence[ContactRecord]) -> list[tuple[int, ...]]:
 
 def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
     """What the laws of contact take at a state."""
-    sizes, k = module.metadata.sizes, len(module.metadata.contacts)
-    n = sum(record.rows for record in module.metadata.contacts)
-    values = module.evaluate(CONTACTS, t, x[:sizes.x], p, inputs)
+    return _numbers_of(module.metadata, module.evaluate(CONTACTS, t, x[:module.metadata.sizes.x], p, inputs))
+
+
+def _numbers_of(metadata: ModuleMetadata, values: np.ndarray) -> Numbers:
+    """The parts of what the function "contacts" gives."""
+    sizes, k = metadata.sizes, len(metadata.contacts)
+    n = sum(record.rows for record in metadata.contacts)
     gap, static, kinetic, restitution = values[:4 * k].reshape(k, 4).T
     rest = values[4 * k:]
     speeds, coordinates = 3 * n + n * n, 3 * n + n * n + sizes.u * n
@@ -288,6 +292,7 @@ class _Phases:
         self.latest_numbers: tuple[tuple[float, bytes, bytes], Numbers] | None = None  # and what they are of
         self.begins = SlipBegins(self.request.span[1] - self.request.span[0])
         self.most_kinetic: float | None = None  # energy, once it was looked at
+        self.evaluators: dict[str, tuple[tuple[str, bytes], Any]] = {}
         self.shared = False
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
@@ -391,10 +396,12 @@ class _Phases:
             piece, first = self.begins.piece(t)
             self.until = min(self.until, piece)
         end = min(request.span[1], self.until)
-        wanted, times = None, None
+        times, inner = None, slice(None)
         if request.times is not None:
             wanted = request.times[(request.times >= t if not self.done else request.times > t) & (request.times <= end)]
-            times = np.unique(np.concatenate([[t], wanted, [end]]))
+            begin = [] if len(wanted) and wanted[0] == t else [t]
+            times = np.concatenate([begin, wanted, [] if end == t or (len(wanted) and wanted[-1] == end) else [end]])
+            inner = slice(len(begin), len(begin) + len(wanted))
         left = None if request.max_steps is None else request.max_steps - self.n_steps
         p = self._parameters()
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
@@ -403,8 +410,10 @@ class _Phases:
             part = self._towards_sticking(t, part)
         outcome = self.part(replace(part, first_step=first) if stiff else part, stiff, all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
-        if wanted is not None:
-            rows = np.isin(outcome.t, wanted)
+        if times is not None:  # they come in order, after them the state where the run ends
+            n, asked = min(len(times), len(rows)), np.zeros(len(times), dtype=bool)
+            asked[inner] = True
+            rows[n:], rows[:n] = False, asked[:n] & (times[:n] == outcome.t[:n])
             ended = outcome.happened and outcome.happened[-1].event not in self.of_event and self.module.metadata.events[
                 outcome.happened[-1].event].stop
             if len(rows) and (not outcome.success or ended):
@@ -439,14 +448,13 @@ class _Phases:
 
     def _held_until(self, t: float, x: np.ndarray) -> float:
         """Until when the directions of contacts that begin to slip are held."""
-        request, p, n = self.request, self._parameters(), self.request.n_state
+        p, n = self._parameters(), self.request.n_state
 
         def rate(t: float, x: np.ndarray) -> np.ndarray:
-            found: np.ndarray = self.module.evaluate("rhs", t, x, p, request.inputs.at(t, x))
-            return found
+            return self._values("rhs", t, x, p)
 
         def slips(t: float, x: np.ndarray) -> dict[int, np.ndarray]:
-            found = numbers(self.module, t, x, p, request.inputs.at(t, x)).slip
+            found = self._numbers(t, x).slip
             return {k: found[self.tangents[k]] for k in self.begins.directions}
 
         tolerated = max(self._tolerated(t, x, k) for k in self.begins.directions)
@@ -455,11 +463,12 @@ class _Phases:
     def _tolerated(self, t: float, x: np.ndarray, k: int) -> float:
         """The error of the slip of a contact that the tolerances of the speeds let pass."""
         sizes, request = self.module.metadata.sizes, self.request
-        at, found = self._numbers(t, x).slip[self.tangents[k]], 0.0
+        at, found, inputs = self._numbers(t, x).slip[self.tangents[k]], 0.0, request.inputs.at(t, x[:request.n_state])
         for j in range(sizes.q, sizes.q + sizes.u):  # slips are linear in the speeds
             moved = x[:request.n_state].copy()
             moved[j] += 1.0
-            by = numbers(self.module, t, moved, request.p, request.inputs.at(t, x[:request.n_state])).slip[self.tangents[k]] - at
+            values = self._values(CONTACTS, t, moved, request.p, inputs)
+            by = _numbers_of(self.module.metadata, values).slip[self.tangents[k]] - at
             found += float(np.linalg.norm(by)) * (float(request.atol[j]) + request.rtol * abs(float(x[j])))
         return found
 
@@ -535,7 +544,7 @@ class _Phases:
         """The state that a switch makes of another one, and what the contacts that are hit do there."""
         other = copy.copy(self)
         other.request = replace(self.request, p=p, inputs=inputs)
-        other.impacts, other.happened, other.doubts, other.latest_numbers = [], [], {}, None
+        other.impacts, other.happened, other.doubts, other.latest_numbers, other.evaluators = [], [], {}, None, {}
         x, decided = x.copy(), []
         for one in made:
             other.modes, other.still = list(one.modes), list(one.still)
@@ -551,8 +560,20 @@ class _Phases:
         inputs = request.inputs.at(t, x[:request.n_state])
         key = t, x[:request.n_state].tobytes(), np.asarray(inputs).tobytes()
         if self.latest_numbers is None or self.latest_numbers[0] != key:  # in the open mode: what is taken is that of all modes
-            self.latest_numbers = key, numbers(self.module, t, x, request.p, inputs)
+            values = self._values(CONTACTS, t, x[:request.n_state], request.p, inputs)
+            self.latest_numbers = key, _numbers_of(self.module.metadata, values)
         return self.latest_numbers[1]
+
+    def _values(self, name: str, t: float, x: np.ndarray, p: np.ndarray, inputs: Any = None) -> np.ndarray:
+        """A function at a state (n_state,), whose numbers were checked when the run began."""
+        key = name, p.tobytes()
+        evaluator = self.evaluators.get(name)
+        if evaluator is None or evaluator[0] != key:
+            made = self.module.unit(name).evaluator(name) if evaluator is None else evaluator[1]
+            made.set_params(p)
+            self.evaluators[name] = evaluator = key, made
+        found: np.ndarray = evaluator[1].one(t, x, self.request.inputs.at(t, x) if inputs is None else inputs)
+        return found
 
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
@@ -785,7 +806,7 @@ class _Phases:
             fired = [(k, "sticks") for k, direction in held.items() if slip[self.tangents[k]] @ direction < 0]
             return (x, fired) if fired else (self._aligned(t, x, held), [])
         if self.begins.since:
-            at = numbers(self.module, t, x, self._parameters(), self.request.inputs.at(t, x[:self.request.n_state]))
+            at = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], self._parameters()))
             turning: dict[int, float] = {}
             for k in self.begins.since:
                 tangents = self.tangents[k]

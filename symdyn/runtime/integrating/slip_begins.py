@@ -17,9 +17,9 @@ import numpy as np
 
 # Slip up to which directions are held, by what the tolerances let pass and by rounding of the speeds.
 TOLERATED, ROUNDED = 10.0, 1e4 * np.finfo(float).eps
-# The first guess of the time until then and the longest one, by the length of the run; by how much guesses grow at most, how
+# The shortest time until then, the first guess and the longest, by the length of the run; by how much guesses grow at most, how
 # many there are, and by how much the slip may be larger than meant.
-SHORTEST, LONGEST, GROWS, GUESSES, LARGER = 1e-12, 1e-3, 100.0, 60, 4.0
+SHORTEST, GUESS, LONGEST, GROWS, GUESSES, LARGER = 1e-12, 1e-6, 1e-3, 100.0, 60, 4.0
 # Pieces by an implicit method end after so many times the time since the slip began; its first step by that time.
 PIECE, FIRST_STEP = 8.0, 0.1
 # Rates of turning by the time since the slip began, up to which explicit methods go on.
@@ -48,15 +48,15 @@ class SlipBegins:
                    slips: Callable[[float, np.ndarray], Mapping[int, np.ndarray]], tolerated: float) -> float:
         """Until when directions are held; rate: x_dot with them, slips: of contacts at a state, tolerated: an error of these."""
         wanted = TOLERATED * tolerated + ROUNDED * float(np.abs(x).max(initial=0.0))
-        shortest = 64 * np.finfo(float).eps * abs(t)
-        after, most = max(SHORTEST * self.length, shortest), LONGEST * self.length
+        shortest = max(SHORTEST * self.length, 64 * np.finfo(float).eps * abs(t))
+        after, most = max(GUESS * self.length, shortest), LONGEST * self.length
         f = rate(t, x)
         for _ in range(GUESSES):
             ahead = x + after / 2 * (f + rate(t + after, x + after * f))
             found = slips(t + after, ahead)
             slip = min(float(found[k] @ d) for k, d in self.directions.items())
             if slip > LARGER * wanted and after > shortest:
-                after = max(shortest, after * max(wanted / slip, 1 / GROWS))
+                after = max(shortest, after * 2 * wanted / slip)
             elif slip >= wanted or after >= most or slip < -wanted:
                 break
             else:
