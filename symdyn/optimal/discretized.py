@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,12 +14,18 @@ from symdyn.optimal.field import Dynamics, Field, Rows
 from symdyn.optimal.loops import Loops, UnitLengths, independent_rows, normals, unit_groups
 from symdyn.optimal.problem import Problem
 from symdyn.optimal.program import Block, Label, Program
+from symdyn.optimal.quadrature import integrals
 from symdyn.optimal.steps import Steps
 from symdyn.optimal.transcription import Transcription, gauss_points
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
 
 MOTION = "the equation of motion of "
 # What a condition whose variables are all given may lack.
 GIVEN = 1e-7
+# Relative errors of integrals of the cost along polynomials, and along motions simulated back, whose states have errors.
+EXACT, SIMULATED = 1e-11, 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,6 +373,43 @@ class Discretized:
         size = np.maximum(np.abs(motion.X).max(axis=0), np.abs(F).max(axis=0) / motion.T) + 1
         return np.asarray(((np.einsum("kg,kgi->ki", weights, lacking) + corrections) / size).max(axis=1))
 
+    def cost_along(self, z: np.ndarray, accuracy: float) -> tuple[float, np.ndarray]:
+        """The cost integrated along the polynomials, and by how much the quadrature of each interval differs from that, (K,),
+        relative to the cost: the integral of its absolute value, and the end. What is below the accuracy counts nothing."""
+        mesh, motion = self.mesh, self.motion(z)
+        x, u = self.polynomials(motion)
+        rate = lambda shares: motion.T * self._integrand(motion, shares, x(shares), u(shares))
+        pieces, sizes = integrals(rate, x.x, EXACT)
+        by_interval = pieces.reshape(mesh.n_intervals, -1).sum(axis=1)
+        end = self._end_cost(motion)
+        size = float(sizes.sum()) + abs(end)
+        quadrature = mesh.B @ self.flow().values(self._arguments(motion))[:, -1]
+        missing = np.maximum(np.abs(quadrature - by_interval) - accuracy, 0.0)
+        return float(by_interval.sum()) + end, np.divide(missing, size, out=missing, where=missing > 0)
+
+    def cost_of(self, z: np.ndarray, simulated: Solution) -> float:
+        """The cost along a motion that was simulated with the inputs and parameters of z."""
+        motion, t0, u = self.motion(z), self.problem.t0, self.polynomials(self.motion(z))[1]
+        last = float(simulated.t[-1])
+
+        def rate(shares: np.ndarray) -> np.ndarray:
+            x = simulated(np.clip(t0 + shares * motion.T, t0, last))
+            return motion.T * self._integrand(motion, shares, x, u(shares))
+
+        ends = self.mesh.ends[[0, -1]]
+        X = motion.X.copy()
+        X[ends] = simulated.x[[0, -1]]
+        return float(integrals(rate, self.mesh.breaks, SIMULATED)[0].sum()) + self._end_cost(replace(motion, X=X))
+
+    def _integrand(self, motion: Motion, shares: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        free = motion.p[list(self.problem.of.free)]
+        t = self.problem.t0 + shares * motion.T
+        return self.problem.integrand.values(np.column_stack([x, inputs, np.broadcast_to(free, (len(t), len(free))), t]))[:, 0]
+
+    def _end_cost(self, motion: Motion) -> float:
+        X, free = motion.X[self.mesh.ends[[0, -1]]], motion.p[list(self.problem.of.free)]
+        at = np.concatenate([X[0], X[1], motion.U[-1], free, [self.problem.t0 + motion.T]])
+        return float(self.problem.end_cost.values(at[None, :])[0, 0])
 
     def transversal(self, motion: Motion) -> float:
         """How far the normals of the constraints at this motion are from lying in those of the guess: the smallest singular value

@@ -283,6 +283,23 @@ def _row(value: Any, name: str, faults: Faults) -> np.ndarray | None:
     return found
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """What was found on a mesh, with the errors of its intervals, (K,): of states and of the cost; along: the cost integrated
+    along the motion; records: of this mesh and those before."""
+
+    made: Discretized
+    found: Found
+    of_states: np.ndarray
+    of_cost: np.ndarray
+    along: float
+    records: tuple[MeshRecord, ...]
+
+    @property
+    def errors(self) -> np.ndarray:
+        return np.maximum(self.of_states, self.of_cost)
+
+
 @dataclass(eq=False)
 class _Search:
     """Solves on one mesh after the other."""
@@ -295,32 +312,40 @@ class _Search:
     def run(self) -> Optimum:
         """See optimize."""
         chosen, problem = self.chosen, self.problem
-        breaks, steps, records = chosen.breaks, chosen.steps, list[MeshRecord]()
-        course, tolerance, before = self.course, chosen.tolerance, None
+        breaks, steps, course = chosen.breaks, chosen.steps, self.course
+        tolerance, solved = chosen.tolerance, None
         while True:
-            made, found = self._solved(breaks, steps, course)
-            motion = made.motion(found.z)
-            errors = made.errors(found.z) if np.isfinite(found.z).all() else np.full(made.mesh.n_intervals, np.nan)
-            records.append(MeshRecord(made.mesh.n_intervals, steps, found.iterations, found.cost, float(errors.max()),
-                                      self._lap()))
-            if not found.solved:
-                raise self._failed(made, found, errors, records, before)
-            before = self._optimum(made, found, errors, records)
-            too_large = tolerance is not None and not bool((errors <= tolerance).all())
-            if not too_large or len(records) > chosen.max_refinements:
+            before, solved = solved, self._measured(*self._solved(breaks, steps, course), solved)
+            if not solved.found.solved:
+                raise self._failed(solved, before)
+            too_large = tolerance is not None and not bool((solved.errors <= tolerance).all())
+            if not too_large or len(solved.records) > chosen.max_refinements:
                 break
             assert tolerance is not None
-            finer = self._refined(made, errors, tolerance, breaks, steps)
+            finer = self._refined(solved.made, solved.errors, tolerance, breaks, steps)
             if finer is None:
                 break
             breaks, steps = finer
-            x, u = made.polynomials(motion)
+            motion = solved.made.motion(solved.found.z)
+            x, u = solved.made.polynomials(motion)
             course = _Course(x, u, motion.p, motion.T)
         if too_large:
-            warnings.warn(f"{problem.module.name}: the error of an interval is {before.error:.2g} after {len(records)} meshes, "
-                          f"above the tolerance {tolerance:g}; allow more refinements, or pass a larger tolerance",
-                          OptimumWarning, stacklevel=3)
-        return self._simulated(before)
+            of = "" if solved.of_states.max() >= solved.of_cost.max() else ", of the integral of the cost,"
+            warnings.warn(f"{problem.module.name}: the error of an interval{of} is {solved.errors.max():.2g} after "
+                          f"{len(solved.records)} meshes, above the tolerance {tolerance:g}; allow more refinements, or pass a "
+                          "larger tolerance", OptimumWarning, stacklevel=3)
+        return self._optimum(solved)
+
+    def _measured(self, made: Discretized, found: Found, before: _Solved | None) -> _Solved:
+        """With the errors of the intervals."""
+        of_states = of_cost = np.full(made.mesh.n_intervals, np.nan)
+        along = np.nan
+        if np.isfinite(found.z).all():
+            of_states = made.errors(found.z)
+            along, of_cost = made.cost_along(found.z, self.chosen.accuracy)
+        record = MeshRecord(made.mesh.n_intervals, made.steps, found.iterations, found.cost,
+                            float(np.maximum(of_states, of_cost).max()), self._lap())
+        return _Solved(made, found, of_states, of_cost, along, (*(before.records if before is not None else ()), record))
 
     def _lap(self) -> float:
         now = clock.perf_counter()
@@ -382,24 +407,23 @@ class _Search:
         finer = [breaks[k] + (breaks[k + 1] - breaks[k]) * np.arange(n) / n for k, n in enumerate(parts)]
         return np.append(np.concatenate(finer), 1.0), steps
 
-    def _optimum(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord]) -> Optimum:
-        problem, mesh, motion = self.problem, made.mesh, made.motion(found.z)
+    def _optimum(self, solved: _Solved) -> Optimum:
+        """The result, with the motion by its inputs; where that cannot be computed, what differs stays not a number."""
+        problem, made, found = self.problem, solved.made, solved.found
+        mesh, motion = made.mesh, made.motion(found.z)
         x, u = made.polynomials(motion)
         in_time = lambda poly: PPoly(poly.c / motion.T ** np.arange(len(poly.c) - 1, -1, -1.0)[:, None, None],
                                      problem.t0 + poly.x * motion.T)
         x, u = in_time(x), in_time(u)
         t = problem.t0 + mesh.nodes * motion.T
         metadata = problem.module.metadata
-        return Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
-                       {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
-                       motion.T, sum(r.iterations for r in records), tuple(records), float(errors.max()), errors,
-                       dict.fromkeys(metadata.x, np.nan), None, made.multipliers(found.multipliers),
-                       *made.costates(found.multipliers, motion.T), self._kind(mesh), found.solved, found.message, 0.0,
-                       problem.t0 + mesh.breaks * motion.T, x, u)
-
-    def _simulated(self, optimum: Optimum) -> Optimum:
-        """With the motion by its inputs; where that cannot be computed, the difference stays not a number."""
-        simulated, difference = None, optimum.difference
+        optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
+                          {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
+                          solved.along, np.nan, motion.T, sum(r.iterations for r in solved.records), solved.records,
+                          float(solved.errors.max()), solved.errors, dict.fromkeys(metadata.x, np.nan), None,
+                          made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
+                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, x, u)
+        simulated, difference, cost = None, optimum.difference, np.nan
         if np.isfinite(optimum.x).all():
             with contextlib.suppress(SymdynError), warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -407,23 +431,24 @@ class _Search:
                 if simulated.success:
                     gaps = np.abs(simulated.x - optimum.x).max(axis=0).tolist()
                     difference = dict(zip(difference, gaps, strict=True))
-        return replace(optimum, simulated=simulated, difference=difference, seconds=clock.perf_counter() - self.begun)
+                    cost = made.cost_of(found.z, simulated)
+        return replace(optimum, simulated=simulated, difference=difference, simulated_cost=cost,
+                       seconds=clock.perf_counter() - self.begun)
 
     def _kind(self, mesh: Transcription) -> str:
         if mesh.kind == "radau":
             return f"Gauss-Radau of degree {mesh.degree}"
         return "Hermite-Simpson" if mesh.kind == "hermite-simpson" else "multiple shooting"
 
-    def _failed(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord],
-                before: Optimum | None) -> NoOptimum:
+    def _failed(self, solved: _Solved, before: _Solved | None) -> NoOptimum:
         """What to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
-        owner = self.problem.module.name
-        optimum = self._simulated(before or self._optimum(made, found, errors, records))
+        owner, made, found = self.problem.module.name, solved.made, solved.found
+        optimum = self._optimum(before or solved)
         used_up = found.iterations >= self.chosen.max_iterations
-        n = sum(record.iterations for record in records)
+        n = sum(record.iterations for record in solved.records)
         head = f"{owner}: no optimal motion was found in {n} iterations ({found.message})"
         if before is not None:
-            head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {len(before.breaks) - 1} is kept"
+            head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {before.made.mesh.n_intervals} is kept"
         if used_up:
             return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess",
                              optimum)

@@ -43,8 +43,12 @@ class Optimum(OverTime):
     t, x, inputs   times of the nodes (n_t,), s, states (n_t, n_x) and inputs (n_t, n_in) there; a name or symbol as an index
                    gives one of them over these times
     params         all parameters (n_p,); values: those that were free, by name
-    cost, duration, iterations   iterations: on all meshes; meshes: what each of them took
-    error          largest error of an interval of the last mesh, relative: see docs/optimal_motion.md; errors: of all (K,)
+    cost, duration, iterations   cost: that is least, by the quadrature of the mesh; iterations: on all meshes; meshes: what each
+                   of them took
+    integrated_cost, simulated_cost   the cost integrated along the polynomials, and along the motion `simulated`, with error
+                   control: both near `cost` where the mesh is fine enough; NaN where it cannot be computed
+    error          largest error of an interval of the last mesh, of states and cost, relative: see docs/optimal_motion.md;
+                   errors: of all (K,)
     simulated      the motion by `simulate` with these inputs; None where it cannot be computed
     difference     by state: largest difference of it, in units of the state; NaN where it cannot be computed
     multipliers    by condition: of the path (n,), of the boundary (1,); derivatives of the cost by what is demanded, with the
@@ -70,6 +74,8 @@ class Optimum(OverTime):
     params: np.ndarray
     values: Mapping[str, float]
     cost: float
+    integrated_cost: float
+    simulated_cost: float
     duration: float
     iterations: int
     meshes: tuple[MeshRecord, ...]
@@ -97,6 +103,11 @@ class Optimum(OverTime):
             return self.inputs[:, metadata.inputs.index(requested)]
         raise ArgumentError(f"{self.module.name}: the optimal motion has no {shown(requested)}; it has "
                             f"{', '.join((*metadata.x, *metadata.inputs))}")
+
+    @property
+    def cost_difference(self) -> float:
+        """By how much the cost integrated along the motion is above that of the quadrature of the mesh."""
+        return self.integrated_cost - self.cost
 
     @property
     def table(self) -> Piecewise:
@@ -136,7 +147,9 @@ class Optimum(OverTime):
                  f"  {self.transcription}, {meshes}, at last {last.n_intervals} intervals, {self.iterations} iterations, "
                  f"{self.seconds:.2g} s",
                  f"  error of an interval {self.error:.2g}; simulated back, the largest difference is "
-                 f"{max(self.difference.values(), default=0.0):.2g}"]
+                 f"{max(self.difference.values(), default=0.0):.2g}",
+                 f"  integrated along it the cost is {self.integrated_cost:.9g}, {self.cost_difference:+.2g}; simulated back "
+                 f"{self.simulated_cost:.9g}"]
         lines += [f"  {name} = {value:.9g}" for name, value in self.values.items()]
         return "\n".join(lines)
 

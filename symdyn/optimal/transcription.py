@@ -2,7 +2,7 @@
 
 With states X at the points of the mesh and F, the rates times the duration at the points of the field,
 
-    E X = W F,      cost = b^T F_cost
+    E X = W F,      cost = sum of B F_cost
 
 are the defects and the quadrature. Both are constant on a mesh, so that all derivatives are those of F. All times are shares of
 the duration, from 0 to 1.
@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,7 +39,7 @@ class Transcription:
     nodes      (N,) shares at which there are states; ends: indices of those at the breaks, (K + 1,)
     samples    (M,) shares at which there are inputs, the last one those at the end
     at_state, at_inputs   (P,), (P, k) which state and which inputs the points of the field depend on; shares (P,) of these
-    E, W, b    the defects and the quadrature; share (R,): when a defect is
+    E, W, B    the defects and, (K, P), the quadrature of each interval; share (R,): when a defect is
     corrected  (R,) index of the interval at whose end constraints are kept by a correction of this defect, -1 for others
     rates      (r, M) matrix of d inputs/d share; joints (j, M): jumps of the inputs between intervals
     order      of the errors that are measured between points; degree: of Radau's polynomials
@@ -55,7 +56,7 @@ class Transcription:
     shares: np.ndarray
     E: sp.csr_matrix
     W: sp.csr_matrix
-    b: np.ndarray
+    B: sp.csr_matrix
     share: np.ndarray
     corrected: np.ndarray
     rates: sp.csr_matrix
@@ -68,6 +69,11 @@ class Transcription:
     @property
     def n_intervals(self) -> int:
         return len(self.breaks) - 1
+
+    @cached_property
+    def b(self) -> np.ndarray:
+        """The weights of the whole quadrature, (P,)."""
+        return np.asarray(self.B.sum(axis=0)).ravel()
 
 
 def hermite_simpson(breaks: np.ndarray) -> Transcription:
@@ -82,7 +88,6 @@ def hermite_simpson(breaks: np.ndarray) -> Transcription:
     W[2 * k, middle - 1], W[2 * k, middle + 1] = h / 8, -h / 8
     E[2 * k + 1, middle + 1], E[2 * k + 1, middle - 1] = 1, -1
     W[2 * k + 1, middle - 1], W[2 * k + 1, middle], W[2 * k + 1, middle + 1] = h / 6, 4 * h / 6, h / 6
-    b = np.asarray(W.tocsr()[1::2].sum(axis=0)).ravel()
     rates = sp.lil_matrix((2 * K, N))
     for row, weights in ((2 * k, (-3, 4, -1)), (2 * k + 1, (1, -4, 3))):
         for shift, weight in zip((-1, 0, 1), weights, strict=True):
@@ -100,7 +105,7 @@ def hermite_simpson(breaks: np.ndarray) -> Transcription:
         return whole
 
     return Transcription("hermite-simpson", breaks, nodes, np.arange(0, N, 2), nodes, np.arange(N), np.arange(N)[:, None], nodes,
-                         E.tocsr(), W.tocsr(), b, nodes[1:], corrected, rates.tocsr(), sp.csr_matrix((0, N)), 4,
+                         E.tocsr(), W.tocsr(), W.tocsr()[1::2], nodes[1:], corrected, rates.tocsr(), sp.csr_matrix((0, N)), 4,
                          3, of_inputs, of_states)
 
 
@@ -120,7 +125,7 @@ def radau(breaks: np.ndarray, degree: int) -> Transcription:
         values.append(D.ravel())
     E = sp.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (P, N))
     W = sp.diags(np.repeat(h, d)).tocsr()
-    b = (h[:, None] * weights).ravel()
+    B = sp.kron(sp.diags(h), weights[None, :]).tocsr()
     slopes, start = _differences(c), _values(c, 0.0)
     rates = sp.block_diag([slopes / length for length in h]).tocsr()
     joints = sp.lil_matrix((K - 1, P))
@@ -137,7 +142,7 @@ def radau(breaks: np.ndarray, degree: int) -> Transcription:
         return PPoly(through(local, X[(np.arange(K) * d)[:, None] + np.arange(d + 1)], h), breaks)
 
     points = np.arange(P)
-    return Transcription("radau", breaks, nodes, np.arange(0, N, d), nodes[1:], points + 1, points[:, None], nodes[1:], E, W, b,
+    return Transcription("radau", breaks, nodes, np.arange(0, N, d), nodes[1:], points + 1, points[:, None], nodes[1:], E, W, B,
                          nodes[1:], corrected, rates, joints.tocsr(), d + 1, d, of_inputs, of_states)
 
 
@@ -158,9 +163,9 @@ def shooting(breaks: np.ndarray, hold: bool) -> Transcription:
     def of_states(X: np.ndarray, F: np.ndarray) -> PPoly:
         raise NotImplementedError("the states of shooting are those of its steps")
 
-    return Transcription("shooting", breaks, breaks, np.arange(K + 1), samples, k, at_inputs, breaks[:-1], E.tocsr(),
-                         sp.identity(K, format="csr"), np.ones(K), breaks[1:], k, rates, sp.csr_matrix((0, M)), 4, 1,
-                         of_inputs, of_states)
+    whole = sp.identity(K, format="csr")
+    return Transcription("shooting", breaks, breaks, np.arange(K + 1), samples, k, at_inputs, breaks[:-1], E.tocsr(), whole,
+                         whole, breaks[1:], k, rates, sp.csr_matrix((0, M)), 4, 1, of_inputs, of_states)
 
 
 def radau_points(d: int) -> tuple[np.ndarray, np.ndarray]:

@@ -141,9 +141,13 @@ def test_costs_and_rates_that_are_not_finite() -> None:
 
 
 def test_mesh_that_is_not_fine_enough(slider: Module) -> None:
-    with pytest.warns(sd.OptimumWarning, match=r"the error of an interval is .* after 1 meshes, above the tolerance 1e-08"):
+    text = r"the error of an interval, of the integral of the cost, is .* after 1 meshes, above the tolerance 1e-08"
+    with pytest.warns(sd.OptimumWarning, match=text):
         found = sd.optimize(slider, sd.Loss(integral=F**2 + x**4), 2.0, end=REST, tolerance=1e-8, max_refinements=0, intervals=3)
     assert found.error > 1e-8 and len(found.meshes) == 1
+    with pytest.warns(sd.OptimumWarning, match=r"the error of an interval is .* after 1 meshes, above the tolerance 1e-08"):
+        sd.optimize(sd.systems.pendulum().compile(backend="c"), sd.Loss(end=sp.Symbol("q1") ** 2), 0.5, start={"q1": (0.1, 1)},
+                    tolerance=1e-8, max_refinements=0, intervals=3)
 
 
 def test_a_finer_mesh_without_a_solution_keeps_that_of_the_mesh_before(slider: Module, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.integrate
 import scipy.linalg
 import scipy.optimize
 import sympy as sp
@@ -154,6 +155,42 @@ def test_free_duration_of_equations_that_depend_on_the_time(transcription: str) 
     exact = scipy.optimize.minimize_scalar(cost, bounds=(0.2, 5), method="bounded", options={"xatol": 1e-10})
     assert found.duration == pytest.approx(exact.x, rel=1e-6) and found.cost == pytest.approx(exact.fun, rel=1e-9)
     assert max(found.difference.values()) < 1e-6
+
+
+@functools.cache
+def bump(narrow: float, place: float) -> tuple[sp.Expr, float]:
+    """What a place costs, and the least cost of a motion over it in 1 s: by 2 x^(4) + g'(x) = 0, a boundary value problem."""
+    x = sp.Symbol("x")
+    cost = 10 * sp.exp(-sp.Float(narrow) * (x - sp.Float(place)) ** 2)
+    g, slope = sp.lambdify(x, cost), sp.lambdify(x, cost.diff(x))
+    t, way = np.linspace(0, 1, 401), np.polynomial.Polynomial([0, 0, 3, -2])
+    exact = scipy.integrate.solve_bvp(lambda s, y: np.array([y[1], y[2], y[3], -slope(y[0]) / 2]),
+                                      lambda a, b: np.array([a[0], a[1], b[0] - 1, b[1]]), t,
+                                      np.array([way(t), *[way.deriv(k)(t) for k in (1, 2, 3)]]), tol=1e-6, max_nodes=20_000)
+    assert exact.success
+    s = np.linspace(0, 1, 100_001)
+    y = exact.sol(s)
+    return cost, float(np.trapezoid(y[2] ** 2 + g(y[0]), s))
+
+
+@pytest.mark.parametrize("transcription", ["hermite-simpson", "radau", "shooting"])
+@pytest.mark.parametrize(("narrow", "place"), [(2000, 0.43), (1e5, 0.437)])
+def test_narrow_costs_are_integrated(transcription: str, narrow: float, place: float) -> None:
+    """Where few points of the first mesh see what a place costs, or none."""
+    expression, least = bump(narrow, place)
+    g, s = sp.lambdify(sp.Symbol("x"), expression), np.linspace(0, 1, 100_001)
+    solved = functools.partial(sd.optimize, slider(), sd.Loss(integral=F**2 + expression), 1.0, end={"x": 1, "x_dot": 0},
+                               transcription=transcription)
+    coarse, found = solved(tolerance=None, steps=1), solved()
+    # Straight inputs of shooting cost more than any others.
+    assert found.cost == pytest.approx(least, rel=5e-6 if transcription != "shooting" else 1e-5) and found.error <= 1e-6
+    for one in (coarse, found):
+        values = one.inputs_at(s)[:, 0] ** 2 + g(one.at(s)[:, 0])
+        assert one.integrated_cost == pytest.approx(np.trapezoid(values, s), rel=1e-7)
+        assert one.cost_difference == one.integrated_cost - one.cost
+    assert abs(found.cost_difference) < 5e-6 * least and abs(found.simulated_cost - found.cost) < 5e-6 * least
+    assert abs(coarse.cost_difference) > 1e-5 * least and coarse.error > 1e-6
+    assert f"integrated along it the cost is {coarse.integrated_cost:.9g}" in str(coarse)
 
 
 def test_path_and_boundary_conditions() -> None:
