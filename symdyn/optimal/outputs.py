@@ -9,7 +9,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.optimal.expressions import Expressions
-from symdyn.optimal.field import Arguments, Groups
+from symdyn.optimal.field import Arguments, Groups, structure_of
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -36,12 +36,13 @@ class WithOutputs:
         self.n = len(expressions.names) - self.n_y
         self._by = Groups(of, len(p), ("x", "inputs", "params", *(("t",) if timed else ())))
         self._at = slice(first, first + of.n)
-        by_outputs = expressions.slopes[:, self.n:].any(axis=1)
         self.m, self.slopes = expressions.m, expressions.slopes[:, :self.n].copy()
         self.curvature = expressions.curvature[:self.n, :self.n].copy()
-        used = np.zeros(self.n, dtype=bool)
-        used[self._at] = self._by.columns(np.ones((1, self._by.whole), dtype=bool))[0]
-        self.slopes[np.ix_(by_outputs, used)] = True
+        of_outputs = np.zeros((self.n_y, self.n), dtype=bool)
+        parts = [structure_of(module, f"outputs_by_{by}", (self.n_y, size)) for by, size in self._by.sizes.items()]
+        of_outputs[:, self._at] = self._by.columns(np.hstack(parts))
+        self.slopes |= expressions.slopes[:, self.n:] @ of_outputs
+        used = of_outputs[expressions.slopes[:, self.n:].any(axis=0)].any(axis=0)
         mixed = used | expressions.curvature[:self.n, self.n:].any(axis=1)
         self.curvature |= np.outer(mixed, used) | np.outer(used, mixed)
 

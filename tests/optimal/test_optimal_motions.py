@@ -254,6 +254,17 @@ def test_outputs_in_conditions_and_costs() -> None:
     assert tips[-1, 1] == pytest.approx(0.3, abs=1e-8) and tips[:, 0].min() == pytest.approx(0.2, abs=1e-7)
 
 
+@pytest.mark.parametrize("transcription", ["hermite-simpson", "radau"])
+def test_outputs_that_no_input_enters_hold_at_the_start(transcription: str) -> None:
+    """The tip begins as high as it may; Radau's points leave the start out, where it would have been 3e-5 above."""
+    tau1, tau2, across, height = sp.symbols("tau1 tau2 tip[0] tip[1]")
+    arm = sd.systems.two_link_arm().compile(backend="c")
+    found = sd.optimize(arm, sd.Loss(integral=tau1**2 + tau2**2 + 100 * (across - 1) ** 2), 0.3, tolerance=None,
+                        start={"q1": (-1.5, 1.5), "q2": 0.5}, end={"q1": 0.1}, path=[height <= sp.Rational(3, 10)],
+                        transcription=transcription)
+    assert arm.outputs(found.t, found.x)["tip"][0, 1] == pytest.approx(0.3, abs=1e-7)
+
+
 def test_a_linkage_between_two_positions() -> None:
     module = linkage()
     q = module.consistent({"q1": 0.5}, keep=["q1"])[0]
