@@ -47,6 +47,8 @@ PARTS, MOST_INTERVALS, MOST_STEPS = 4, 2000, 512
 DEGREES = (1, 2, 3, 4)
 # What the elastic problem must miss for the problem to be infeasible.
 MISSED = 1e-6
+# What a motion simulated back may differ by without a warning, relative: without a tolerance; with one, its root.
+APART = 0.01
 # Of normals at the guess and at the solution: where the smallest singular value of their products is less, they are taken again.
 TRANSVERSAL = 0.5
 
@@ -55,9 +57,9 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
              end: Ends | None = None, *, bounds: Limits | None = None, rates: Limits | None = None,
              path: Sequence[sp.Basic] = (), boundary: Sequence[sp.Basic] = (), parameters: Limits | None = None,
              params: Values | None = None, inputs: Numbers | None = None, t: float = 0.0,
-             guess: Solution | Optimum | ByName | None = None, transcription: str = "hermite-simpson", intervals: int | Row = 20,
-             degree: int = 3, steps: int = 4, hold: bool = False, tolerance: float | None = 1e-6, max_refinements: int = 6,
-             method: str = "ipopt", accuracy: float = 1e-8, max_iterations: int = 1000,
+             guess: Solution | Optimum | ByName | None = None, transcription: str | None = None, intervals: int | Row = 20,
+             degree: int | None = None, steps: int = 4, hold: bool = False, tolerance: float | None = 1e-6,
+             max_refinements: int = 6, method: str = "ipopt", accuracy: float = 1e-8, max_iterations: int = 1000,
              options: Mapping[str, str | float] | None = None, verbose: bool = False) -> Optimum:
     """The motion of least cost between a start and an end, with its inputs and free parameters.
 
@@ -78,16 +80,19 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
                  numbers; what is left out goes straight from the start to the end
     transcription   "hermite-simpson": cubic states, order 4; "radau": collocation at `degree` points, 1 to 4, of order
                  2 degree - 1; "shooting": `steps` of Runge and Kutta's method in each interval, with inputs that are constant
-                 there (hold) or straight
+                 there (hold) or straight. Default: "hermite-simpson", degree 3; where an equality of path holds states alone
+                 "radau", degree 4
     intervals    of the first mesh, or its ends as shares of the duration from 0 to 1
     tolerance    error of each interval, relative, up to which the mesh is refined, max_refinements times; None: it is not
     method       "ipopt", by CasADi (pip install 'symdyn[opt]'), or SciPy's "slsqp" or "trust-constr", for small problems
     accuracy, max_iterations, options   of the solver; options: IPOPT's own; verbose: print its iterations
 
     Constraints of closed loops are kept at the ends of all intervals, for positions and velocities. All derivatives are exact.
-    The result is simulated back. Raises ArgumentError with all faults, NoOptimum with what is violated and by how much, whose
-    `optimum` is what was computed; EvaluationError for a cost that is not finite; MissingExtra where IPOPT is not installed. An
-    OptimumWarning reports errors above the tolerance on the last mesh.
+    The result is simulated back. An OptimumWarning reports errors above the tolerance on the last mesh, and a motion simulated
+    back that differs by more than the root of the tolerance, 0.01 without one, relative to the largest value of a state plus 1;
+    so does a cost integrated along the motion. Raises ArgumentError with all faults, NoOptimum with what is violated and by how
+    much, whose `optimum` is what was computed; EvaluationError for a cost that is not finite; MissingExtra where IPOPT is not
+    installed.
 
     >>> x = sd.coordinates("x")
     >>> F = sd.inputs("F")
@@ -118,16 +123,32 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     faults.demand_none()
     if method == "ipopt":
         ipopt.casadi()
+    on_states = bool(_on_states(problem))
+    chosen = replace(chosen, kind=chosen.kind or ("radau" if on_states else "hermite-simpson"),
+                     degree=chosen.degree or (4 if on_states else 3))
     return _Search(problem, chosen, course, begun).run()
+
+
+def _on_states(problem: Problem, alone: slice = slice(0)) -> list[str]:
+    """Equalities at all times that hold states and no inputs, and none of those states `alone`: inputs have to be such that they
+    stay fulfilled.
+
+    Those of Hermite and Simpson's method then go to and fro from point to point. With points of Radau their order is the degree
+    less 1 for conditions of speeds, less 2 for those of coordinates.
+    Source: Hairer and Wanner, Solving Ordinary Differential Equations II, sections VII.4 and VII.5.
+    """
+    conditions, slopes = problem.path, problem.path.expressions.slopes
+    held = (conditions.least == conditions.most) & ~slopes[:, problem.of.inputs].any(axis=1) & ~slopes[:, alone].any(axis=1)
+    return [text for text, one in zip(conditions.texts, held, strict=True) if one]
 
 
 @dataclass(frozen=True)
 class _Chosen:
     """How it is optimized, checked."""
 
-    kind: str
+    kind: str | None
     breaks: np.ndarray
-    degree: int
+    degree: int | None
     steps: int
     hold: bool
     tolerance: float | None
@@ -144,10 +165,12 @@ class _Chosen:
         """Adds what does not fit to the faults."""
         n = len(faults.found)
         for what, value, there in (("transcription", kind, TRANSCRIPTIONS), ("method", method, METHODS)):
-            if not isinstance(value, str) or value not in there:
+            if not (value is None and what == "transcription") and (not isinstance(value, str) or value not in there):
                 faults.add(f"{what} is {shown(value)}; there are {', '.join(map(repr, there))}")
         for what, value, least, most in (("degree", degree, 1, DEGREES[-1]), ("steps", steps, 1, MOST_STEPS),
                                          ("max_refinements", refinements, 0, 100), ("max_iterations", iterations, 1, 10**9)):
+            if value is None and what == "degree":
+                continue
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
                 faults.add(f"{what} is {shown(value)}; pass a whole number from {least} to {most}")
         for what, value in (("tolerance", tolerance), ("accuracy", accuracy)):
@@ -155,19 +178,20 @@ class _Chosen:
             if not fits and not (what == "tolerance" and value is None):
                 or_none = ", or None" if what == "tolerance" else ""
                 faults.add(f"{what} is {shown(value)}; pass a number between 0 and 1{or_none}")
-        if not isinstance(hold, bool) or (hold and kind in TRANSCRIPTIONS and kind != "shooting"):
-            faults.add(f"hold is {shown(hold)}, and transcription is {shown(kind)}; inputs are held with shooting alone")
+        if not isinstance(hold, bool) or (hold and kind in (None, *TRANSCRIPTIONS) and kind != "shooting"):
+            faults.add(f"hold is {shown(hold)}, and transcription is {shown(kind)}; inputs are held with \"shooting\" alone")
         breaks = _breaks(intervals, faults)
         if options is not None and not isinstance(options, Mapping):
             faults.add(f"options is {shown(options)}; pass a mapping from names of IPOPT's options to values")
         if len(faults.found) > n:
             return None
-        return cls(kind, breaks, int(degree), int(steps), bool(hold), tolerance, int(refinements), method, float(accuracy),
-                   int(iterations), dict(options or {}), bool(verbose))
+        return cls(kind, breaks, None if degree is None else int(degree), int(steps), bool(hold), tolerance, int(refinements),
+                   method, float(accuracy), int(iterations), dict(options or {}), bool(verbose))
 
     def mesh(self, breaks: np.ndarray) -> Transcription:
         """The transcription on a mesh."""
         if self.kind == "radau":
+            assert self.degree is not None
             return radau(breaks, self.degree)
         return hermite_simpson(breaks) if self.kind == "hermite-simpson" else shooting(breaks, self.hold)
 
@@ -333,8 +357,49 @@ class _Search:
             of = "" if solved.of_states.max() >= solved.of_cost.max() else ", of the integral of the cost,"
             warnings.warn(f"{problem.module.name}: the error of an interval{of} is {solved.errors.max():.2g} after "
                           f"{len(solved.records)} meshes, above the tolerance {tolerance:g}; allow more refinements, or pass a "
-                          "larger tolerance", OptimumWarning, stacklevel=3)
-        return self._optimum(solved)
+                          f"larger tolerance{self._radau_instead()}", OptimumWarning, stacklevel=3)
+        optimum = self._optimum(solved)
+        rough = _on_states(problem, slice(problem.module.metadata.sizes.q, problem.of.n_x)) if chosen.degree in (1, 2, 3) and (
+            chosen.kind == "radau") else []
+        if rough:
+            order = "do not converge" if chosen.degree != 3 else "converge by the first order alone"
+            warnings.warn(f"{problem.module.name}: inputs {order} with degree {chosen.degree} under the condition {rough[0]}, "
+                          "which holds coordinates, and the cost is that far from the least one; leave degree out, for 4",
+                          OptimumWarning, stacklevel=3)
+        apart = self._apart(optimum)
+        if apart:
+            warnings.warn(f"{problem.module.name}: {apart}; {self._finer(optimum)}", OptimumWarning, stacklevel=3)
+        return optimum
+
+    def _apart(self, optimum: Optimum) -> str:
+        """In what the motion simulated back, and the cost along it, differ by too much; nothing if they do not."""
+        tolerance = self.chosen.tolerance
+        most = APART if tolerance is None else np.sqrt(tolerance)
+        if optimum.simulated is None or not optimum.simulated.success:
+            why = "" if optimum.simulated is None else f": {optimum.simulated.message}"
+            return f"the motion could not be simulated back by its inputs{why}"
+        gaps, found = np.array(list(optimum.difference.values())), []
+        parts = gaps / (1 + np.abs(optimum.x).max(axis=0))
+        if len(parts) and not parts.max() <= most:
+            k = int(parts.argmax())
+            found.append(f"simulated back by its inputs, {optimum.module.metadata.x[k]} differs by {gaps[k]:.3g} from the motion "
+                         "found")
+        away = abs(optimum.cost_difference)
+        if not away <= max(most * max(abs(optimum.cost), abs(optimum.integrated_cost)), 2 * self.chosen.accuracy):
+            found.append(f"the cost is {optimum.cost:.6g} by the quadrature of the mesh, and {optimum.integrated_cost:.6g} "
+                         "integrated along the motion")
+        return "; ".join(found) + (f" (allowed is {most:.2g} of the largest value plus 1, or of the cost)" if found else "")
+
+    def _finer(self, optimum: Optimum) -> str:
+        """What to do about a motion that is not exact enough."""
+        if self.chosen.tolerance is None:
+            return f"pass a tolerance, with which the mesh is refined, or more intervals{self._radau_instead()}"
+        return f"pass a smaller tolerance, or keep an unstable motion by a regulator, optimum.lqr{self._radau_instead()}"
+
+    def _radau_instead(self) -> str:
+        """What to take in place of Hermite and Simpson's method where equalities hold states alone."""
+        held = _on_states(self.problem) if self.chosen.kind == "hermite-simpson" else []
+        return f"; or leave transcription out: inputs of Hermite and Simpson go to and fro under {held[0]}" if held else ""
 
     def _measured(self, made: Discretized, found: Found, before: _Solved | None) -> _Solved:
         """With the errors of the intervals."""
@@ -450,8 +515,8 @@ class _Search:
         if before is not None:
             head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {before.made.mesh.n_intervals} is kept"
         if used_up:
-            return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess",
-                             optimum)
+            return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess"
+                             f"{self._radau_instead()}", optimum)
         try:
             begin = made.motion(found.z) if np.isfinite(found.z).all() else made.guess
             elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True)
@@ -461,10 +526,10 @@ class _Search:
         s = nearest.z[elastic.layout.n:].reshape(2, -1)
         missed = np.abs(s[0] - s[1])
         if not nearest.solved:
-            return NoOptimum(f"{head}; {self._worst(made, found.z)}; begin with another guess", optimum)
+            return NoOptimum(f"{head}; {self._worst(made, found.z)}; begin with another guess{self._radau_instead()}", optimum)
         if missed.max(initial=0.0) <= MISSED:
             return NoOptimum(f"{head}; a motion that fulfils all conditions exists, so begin with another guess: "
-                             f"{self._worst(made, found.z)}", optimum)
+                             f"{self._worst(made, found.z)}{self._radau_instead()}", optimum)
         texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
                 for k in np.argsort(-missed)[:4] if missed[k] > MISSED]
         return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",

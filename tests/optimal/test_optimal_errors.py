@@ -80,7 +80,8 @@ def slider() -> Module:
     ({"accuracy": None}, "accuracy is None; pass a number between 0 and 1$"),
     ({"options": 1}, "options is 1; pass a mapping"),
     ({"options": {"no_such": 3}}, "IPOPT does not take options {'no_such': 3}"),
-    ({"hold": True}, "hold is True, and transcription is 'hermite-simpson'; inputs are held with shooting alone"),
+    ({"hold": True}, "hold is True, and transcription is None; inputs are held with \"shooting\" alone"),
+    ({"hold": True, "transcription": "radau"}, "hold is True, and transcription is 'radau'; inputs are held"),
     ({"hold": True, "transcription": "shooting", "rates": {"F": (-1, 1)}}, "inputs that are held jump between intervals"),
 ])
 def test_faults_of_a_call(slider: Module, given: dict[str, Any], text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from typing import Any
 
 import numpy as np
@@ -263,6 +264,77 @@ def test_outputs_that_no_input_enters_hold_at_the_start(transcription: str) -> N
                         start={"q1": (-1.5, 1.5), "q2": 0.5}, end={"q1": 0.1}, path=[height <= sp.Rational(3, 10)],
                         transcription=transcription)
     assert arm.outputs(found.t, found.x)["tip"][0, 1] == pytest.approx(0.3, abs=1e-7)
+
+
+def _along_a_line(arm: Module, q0: np.ndarray, way: float, n: int = 12) -> float:
+    """The least cost of a tip that moves along a horizontal line: over polynomials of its course, by inverse dynamics; n of these
+    end 1e-5 above it."""
+    p = arm.parameters()
+    first, second = (float(p[arm.metadata.parameters.index(name)]) for name in ("l1", "l2"))
+    t, w = np.polynomial.legendre.leggauss(60)
+    t, w = (t + 1) / 2, w / 2
+    polynomial = np.polynomial.Polynomial
+
+    def tip(q: np.ndarray) -> np.ndarray:
+        return np.stack([first * f(q[:, 0]) + second * f(q.sum(axis=1)) for f in (np.cos, np.sin)], axis=1)
+
+    def slopes(q: np.ndarray) -> np.ndarray:
+        x, y = tip(q).T
+        both = q.sum(axis=1)
+        return np.array([[-y, -second * np.sin(both)], [x, second * np.cos(both)]]).transpose(2, 0, 1)
+
+    def torques(coefficients: np.ndarray) -> np.ndarray:
+        free = np.polynomial.Chebyshev(coefficients, domain=[0, 1]).convert(kind=polynomial)
+        course = polynomial([0, 0, 3, -2]) * way + polynomial([0, 0, 1, -2, 1]) * free
+        wanted = tip(q0[None, :]) + np.stack([course(t), 0 * t], axis=1)
+        q = np.tile(q0, (len(t), 1))
+        for _ in range(30):
+            q = q + np.linalg.solve(slopes(q), (wanted - tip(q))[:, :, None])[:, :, 0]
+        assert np.abs(tip(q) - wanted).max() < 1e-12
+        u = np.linalg.solve(slopes(q), np.stack([course.deriv()(t), 0 * t], axis=1)[:, :, None])[:, :, 0]
+        both = u.sum(axis=1) ** 2
+        turning = -np.stack([first * f(q[:, 0]) * u[:, 0] ** 2 + second * f(q.sum(axis=1)) * both for f in (np.cos, np.sin)],
+                            axis=1)
+        rates = np.linalg.solve(slopes(q), (np.stack([course.deriv(2)(t), 0 * t], axis=1) - turning)[:, :, None])[:, :, 0]
+        x, none = np.hstack([q, u]), np.zeros((len(t), 2))
+        idle, B = arm.evaluate("rhs", t, x, p, none)[:, 2:], arm.evaluate("jacobian_inputs", t, x, p, none)[:, 2:]
+        tau = np.linalg.solve(B, (rates - idle)[:, :, None])[:, :, 0]
+        return (np.sqrt(w)[:, None] * tau).ravel()
+
+    return 2 * float(scipy.optimize.least_squares(torques, np.zeros(n), xtol=1e-12, ftol=1e-12, gtol=1e-12).cost)
+
+
+def test_a_tip_on_a_line() -> None:
+    """Under an equality of states Radau's method is taken; that of Hermite and Simpson ends 2 % above."""
+    arm = sd.systems.two_link_arm().compile(backend="c")
+    tau1, tau2, across, height = sp.symbols("tau1 tau2 tip[0] tip[1]")
+    q0 = np.array([-1.2, 1.6])
+    tip = arm.outputs(0, [*q0, 0, 0])["tip"]
+    solved = functools.partial(sd.optimize, arm, sd.Loss(integral=tau1**2 + tau2**2), 1.0, start={"q1": q0[0], "q2": q0[1]},
+                               end={"q1_dot": 0, "q2_dot": 0}, boundary=[sp.Eq(across, tip[0] - 0.15)],
+                               path=[sp.Eq(height, sp.Float(tip[1]))])
+    found, shot = solved(), solved(transcription="shooting", intervals=40)
+    least = _along_a_line(arm, q0, -0.15)
+    assert found.transcription == "Gauss-Radau of degree 4" and found.iterations < 30
+    assert found.cost == pytest.approx(least, rel=2e-5) and shot.cost == pytest.approx(found.cost, rel=2e-6)
+    text = (r"the cost is 5.9\d+ by the quadrature of the mesh, and 5.7\d+ integrated along the motion \(allowed is 0.01 .*leave "
+            r"transcription out: inputs of Hermite and Simpson go to and fro under tip")
+    with pytest.warns(sd.OptimumWarning, match=text):
+        assert solved(transcription="hermite-simpson", tolerance=None).cost > 1.02 * least
+    text = r"inputs converge by the first order alone with degree 3 under the condition tip\[1\]"
+    with pytest.warns(sd.OptimumWarning, match=text):
+        assert solved(transcription="radau", degree=3, tolerance=None).cost > 1.01 * least
+
+
+def test_motions_that_differ_when_they_are_simulated_back() -> None:
+    """An unstable motion on a coarse mesh."""
+    text = r"simulated back by its inputs, q2_dot differs by \S+ from the motion found \(allowed is 0.01 .*pass a tolerance"
+    with pytest.warns(sd.OptimumWarning, match=text):
+        found = sd.optimize(cart_pole(), EFFORT, 2.0, **KELLY, intervals=10, tolerance=None)
+    assert np.abs(found.simulated.x - found.x)[:, 3].max() == found.difference["q2_dot"] > 0.1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", sd.OptimumWarning)
+        sd.optimize(cart_pole(), EFFORT, 2.0, **KELLY)
 
 
 def test_a_linkage_between_two_positions() -> None:
