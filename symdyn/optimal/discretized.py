@@ -153,6 +153,8 @@ class Discretized:
         wrong = np.flatnonzero(~depends & ~(missing <= GIVEN))
         if len(wrong) and not self.elastic:
             texts = [f"{self.text(program, row)} by {missing[row]:.3g}" for row in wrong[:4]]
+            if len(wrong) > len(texts):
+                texts.append(f"and {len(wrong) - len(texts)} more")
             how = " (module.consistent finds states that fulfil constraints)" if len(self.rows_of_loops) else ""
             raise ArgumentError(f"{self.problem.module.name}: what is prescribed violates {'; '.join(texts)}; change the start, "
                                 f"the end or the condition{how}")
