@@ -301,8 +301,14 @@ def _row(value: Any, name: str, faults: Faults) -> np.ndarray | None:
     except NotReal as error:
         faults.add(f"{name} of the guess must be numbers, found {shown(value)}: {error}")
         return None
-    if found.ndim > 1 or not np.isfinite(found).all():
-        faults.add(f"{name} of the guess must be finite numbers in a row, found the shape {found.shape}")
+    if found.ndim > 1:
+        faults.add(f"{name} of the guess must be numbers in a row, found the shape {found.shape}")
+        return None
+    wrong = np.flatnonzero(~np.isfinite(found))
+    if len(wrong):
+        of = f", of {found.size} values {len(wrong)} are not" if len(wrong) > 1 else ""
+        at = f" at its index {wrong[0]}" if found.ndim else ""
+        faults.add(f"{name} of the guess must be finite, and is {found.ravel()[wrong[0]]}{at}{of}")
         return None
     return found
 

@@ -66,7 +66,11 @@ def slider() -> Module:
     ({"guess": 3}, "guess is 3; pass a Solution, an Optimum, or a mapping"),
     ({"guess": {"y": 1}}, "guess has 'y', which is not there"),
     ({"guess": {"x": ["a"]}}, "x of the guess must be numbers"),
-    ({"guess": {"x": [[1, 2]]}}, "x of the guess must be finite numbers in a row, found the shape \\(1, 2\\)"),
+    ({"guess": {"x": [[1, 2]]}}, "x of the guess must be numbers in a row, found the shape \\(1, 2\\)"),
+    ({"guess": {"t": [0, 1], "x": [0, np.nan]}}, "x of the guess must be finite, and is nan at its index 1$"),
+    ({"guess": {"t": [0, 1, 2], "x": [0, np.inf, np.nan]}},
+     "x of the guess must be finite, and is inf at its index 1, of 3 values 2 are not"),
+    ({"guess": {"x": np.nan}}, "x of the guess must be finite, and is nan$"),
     ({"guess": {"t": [0, 1, 2], "x": [1, 2]}}, "x of the guess has 2 values, and t has 3"),
     ({"guess": {"t": [0, 0]}}, "t of the guess must be two or more increasing times"),
     ({"transcription": "euler"}, "transcription is 'euler'; there are 'hermite-simpson', 'radau', 'shooting'"),
@@ -117,6 +121,10 @@ def test_an_infeasible_path_by_how_much(slider: Module) -> None:
 def test_conditions_that_what_is_given_violates(slider: Module) -> None:
     with pytest.raises(sd.ArgumentError, match=r"what is prescribed violates x >= 1/2 at t = 0 s by 0.5; change the start"):
         sd.optimize(slider, EFFORT, 2.0, end=REST, path=[x >= sp.Rational(1, 2)])
+    constant = [sp.Ge(sd.t, 3, evaluate=False)]  # at none of the 41 nodes, which depend on nothing that is free
+    text = r"violates t >= 3 at t = 0 s by 3; .*; .*; t >= 3 at t = 0.15 s by .*; and 37 more; "
+    with pytest.raises(sd.ArgumentError, match=text):
+        sd.optimize(slider, EFFORT, 2.0, end=REST, path=constant)
     module = sd.systems.four_bar().compile(backend="c")
     with pytest.raises(sd.ArgumentError, match=r"the constraint hinge4_x at t = 0 s by .*module.consistent finds"):
         sd.optimize(module, sd.Loss(end=sp.Symbol("q1") ** 2), 1.0, start={"q1": 1.2})
