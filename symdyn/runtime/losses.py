@@ -55,13 +55,27 @@ class Costs(NamedTuple):
     by: np.ndarray | None
 
 
+class Surfaces(NamedTuple):
+    """What passes zero where a cost may jump, (n, k), and its derivatives by the time, x and what a gradient is by,
+    (n, k, 1 + n_x + n_by)."""
+
+    values: np.ndarray
+    slopes: np.ndarray
+
+
 @dataclass(frozen=True)
 class Cost:
-    """A function of times (n,), states (n, n_x) and inputs (n, n_in) that gives a cost and its derivatives; smooth: whether it is
-    known to have no kink."""
+    """A function of times (n,), states (n, n_x) and inputs (n, n_in) that gives a cost and its derivatives.
+
+    smooth     whether it is known to have no kink
+    surfaces   where it may jump, of the same arguments; None: nowhere, or that is not known
+    known      whether all places where it may jump are those
+    """
 
     of: Callable[[np.ndarray, np.ndarray, np.ndarray], Costs]
     smooth: bool
+    surfaces: Callable[[np.ndarray, np.ndarray, np.ndarray], Surfaces] | None = None
+    known: bool = True
 
     def __call__(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
         return self.of(t, x, inputs)
@@ -105,7 +119,7 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
         return _finite(module, what, t, Costs(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]),
                                               np.array([r[2][places] for r in rows]).reshape(len(rows), len(by))))
 
-    return Cost(all_rows, smooth=False)
+    return Cost(all_rows, smooth=False, known=False)
 
 
 def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndarray) -> Cost:
@@ -120,26 +134,35 @@ def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: 
         raise ArgumentError(f"{module.name}: {what} of the loss is {shown(given)}; pass an expression of coordinates, speeds, "
                             "inputs, parameters and sd.t, or a function of (t, x, p) that returns its value and its "
                             "derivatives") from None
-    tape = _differentiated(f"{module.name}: {what} of the loss", expression, metadata.x, metadata.inputs, metadata.parameters,
-                           tuple(by))
+    tape, jumping = _differentiated(f"{module.name}: {what} of the loss", expression, metadata.x, metadata.inputs,
+                                    metadata.parameters, tuple(by))
     fixed = dict(zip(metadata.parameters, p.tolist(), strict=True))
 
+    def at(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> dict[str, Any]:
+        return {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed}
+
     def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
-        at = {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed}
-        found = evaluate_rows(tape, at, len(t))
+        found = evaluate_rows(tape, at(t, x, inputs), len(t))
         values, rows = found["values"].reshape(len(t)), found["slopes"].reshape(len(t), -1)
         others = rows[:, x.shape[1]:] if rows.shape[1] > x.shape[1] else None
         return _finite(module, what, t, Costs(values, rows[:, :x.shape[1]], others))
 
-    return Cost(all_rows, smooth=all(map(_is_smooth, tape.steps)))
+    def surfaces(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Surfaces:
+        assert jumping is not None
+        found = evaluate_rows(jumping, at(t, x, inputs), len(t))
+        return Surfaces(found["surfaces"], found["slopes"])
+
+    return Cost(all_rows, smooth=all(map(_is_smooth, tape.steps)), surfaces=None if jumping is None else surfaces)
 
 
 @lru_cache(maxsize=64)  # an optimizer asks for the gradient of one loss many times
 def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], inputs: Sequence[str], parameters: Sequence[str],
-                    by: Sequence[str]) -> Tape:
-    """An expression, and its derivatives by the states and, unless these are all zero, by others; what: how messages call it."""
+                    by: Sequence[str]) -> tuple[Tape, Tape | None]:
+    """An expression, and its derivatives by the states and, unless these are all zero, by others; the surfaces where it may jump
+    with their derivatives, None without one. what: how messages call it."""
     from symdyn.tape import node as kinds
     from symdyn.tape.differentiate import reverse
+    from symdyn.tape.jumps import jumps
     from symdyn.tape.node import is_zero
     from symdyn.tape.recorder import Recorder
     from symdyn.tape.sympy_bridge import record_expression
@@ -161,7 +184,12 @@ def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], input
     slopes = reverse(recorder, value, [leaves[name] for name in (*states, *by)])
     if all(map(is_zero, slopes[len(states):])):
         slopes = slopes[:len(states)]
-    return Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
+    costs = Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
+    found = [jump.surface for jump in jumps(recorder, [value])]
+    if not found:
+        return costs, None
+    rows = [reverse(recorder, surface, [leaves[name] for name in ("t", *states, *by)]) for surface in found]
+    return costs, Tape.of(recorder, surfaces=np.array(found, dtype=object), slopes=np.array(rows, dtype=object))
 
 
 def _is_smooth(node: Node) -> bool:

@@ -20,8 +20,8 @@ from symdyn.errors import EvaluationError
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.carried_on import CarriedOn
 from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.way_back import Way
-from symdyn.runtime.losses import Cost
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -137,7 +137,7 @@ class Bridge:
         _converged(way.module, t, change, slopes)
         return cls(way, t, x, length, x + length * (A @ slopes), x + length * slopes.mean(axis=0))
 
-    def back(self, integral: Cost | None, weights: np.ndarray) -> float:
+    def back(self, integral: Integral | None, weights: np.ndarray) -> float:
         """Carry weights of the end to the start, in place; its part of the integral."""
         n_x, way, half = len(self.x), self.way, self.length / 2
         times = self.t + C * self.length
@@ -173,7 +173,8 @@ def _converged(module: Module, t: float, change: float, values: np.ndarray) -> N
 
 @dataclass
 class Jump:
-    """Events at a time: states and slopes before and after, None after an end; which of them sets the time.
+    """Events at a time: states and slopes before and after, None after an end; which of them sets the time; step: a short one,
+    by which either side is looked at.
 
     The change of the time by those of the state before it and of the others is -(by_x x' + by p')/rate.
     """
@@ -184,18 +185,21 @@ class Jump:
     slope: np.ndarray
     events: tuple[int, ...]
     first: int
+    step: float
     after: np.ndarray | None = None
     slope_after: np.ndarray | None = None
     reset: CarriedOn | None = None
 
-    def back(self, integral: Cost | None, weights: np.ndarray, end: float = 0.0) -> float:
+    def back(self, integral: Integral | None, weights: np.ndarray, end: float = 0.0) -> float:
         """Carry weights of the state after it to that before, in place; end: what the loss gains by time, where the motion ends
         here."""
         n_x = len(self.x)
         g_x, _, g_others = self._derivatives("events")
         later, rate = end, self.rate()
         if integral is not None:
-            later += self._cost(integral, self.x) - (self._cost(integral, self.after) if self.after is not None else 0.0)
+            later += self._cost(integral, self.x, self.slope, -self.step)
+        if integral is not None and self.after is not None and self.slope_after is not None:
+            later -= self._cost(integral, self.after, self.slope_after, self.step)
         if self.after is None:
             later += float(weights[:n_x] @ self.slope)
         else:
@@ -249,9 +253,12 @@ class Jump:
                 row += 1
         return list(found), list(found.values())
 
-    def _cost(self, integral: Cost, x: np.ndarray) -> float:
-        t = np.array([self.t])
-        return float(integral(t, x[None, :], self.way.request.inputs.rows(t, x[None, :])).values[0])
+    def _cost(self, integral: Integral, x: np.ndarray, slope: np.ndarray, step: float) -> float:
+        """The integrand as it is on one side of a state, where it may jump with the event."""
+        steps = step * np.array([1.0, 2.0])
+        t, states = self.t + steps, x + steps[:, None] * slope
+        near, far = integral(t, states, self.way.request.inputs.rows(t, states)).values
+        return float(2 * near - far)
 
     def _derivatives(self, of: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of a function by the state before, by the time, and by what is carried."""
@@ -293,9 +300,12 @@ class Chain:
         self.end = (request.span[0], request.x0)
         self.way: Way | None = None
 
-    def forth(self) -> tuple[float, np.ndarray]:
-        """To the end: the time and the state there."""
+    def forth(self, integral: Integral | None = None) -> tuple[float, np.ndarray]:
+        """To the end: the time and the state there; integral: what is measured along the first run."""
         t, x = self.end
+        if integral is not None:
+            first, inputs = self.outcome, self.request.inputs.recorded(self.record)
+            integral.over_rows(first.t, first.x, inputs.rows(first.t, first.x))
         if self.record is not None:
             self.pieces.append(self._instant(t, x, 0))
         for number, cut in enumerate(self.cuts):
@@ -310,7 +320,7 @@ class Chain:
         self.end = self._through(t, x, self.request.span[1])
         return self.end
 
-    def back(self, integral: Cost | None, weights: np.ndarray, by_time: Callable[[], float]) -> float:
+    def back(self, integral: Integral | None, weights: np.ndarray, by_time: Callable[[], float]) -> float:
         """Carry weights of the end to the start, in place; the integral. by_time: what the loss at the end gains by time."""
         value, waiting = 0.0, dict[tuple[int, int], float]()
         n_x = len(self.request.x0)
@@ -376,7 +386,7 @@ class Chain:
         self.n_steps += 1
         t, x = at + bridge.length, bridge.end
         field = _Field(self.module, way.request)
-        jump = Jump(way, t, x, field.one_sided(t, x, -BESIDE * bridge.length), cut.events, first)
+        jump = Jump(way, t, x, field.one_sided(t, x, -BESIDE * bridge.length), cut.events, first, BESIDE * bridge.length)
         before = self.module.evaluate("events", bridge.t, bridge.x, self.request.p, field.inputs(bridge.t, bridge.x))[first]
         if abs(before) > GRAZES * abs(jump.rate() * bridge.length):
             raise EvaluationError(f"{self.module.name}: the quantity of the event {records[first].name} vanishes at t = {t:.9g} "

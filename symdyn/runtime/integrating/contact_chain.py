@@ -16,8 +16,8 @@ from symdyn.errors import EvaluationError
 from symdyn.runtime.contact_laws import SLIDING, STICKING
 from symdyn.runtime.integrating.contact_columns import Switch
 from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.way_back import Feedback, Way
-from symdyn.runtime.losses import Cost
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -33,15 +33,17 @@ class ContactChain:
                  switches: Sequence[Switch], room: float) -> None:
         self.module, self.request, self.method, self.carried = module, replace(request, look=None), method, tuple(carried)
         self.switches, self.room = switches, room
-        self.end = float(outcome.t[-1]), outcome.x[-1]
+        self.end, self.rows = (float(outcome.t[-1]), outcome.x[-1]), (outcome.t, outcome.x)
         self.n_steps, self.memory = outcome.n_steps, outcome.t.nbytes + outcome.x.nbytes
         self._check(outcome)
 
-    def forth(self) -> tuple[float, np.ndarray]:
-        """The time and the state at the end."""
+    def forth(self, integral: Integral | None = None) -> tuple[float, np.ndarray]:
+        """The time and the state at the end; integral: what is measured along the motion."""
+        if integral is not None:
+            integral.over_rows(*self.rows, self.request.inputs.rows(*self.rows))
         return self.end
 
-    def back(self, integral: Cost | None, weights: np.ndarray, by_time: Callable[[], float] | None = None) -> float:
+    def back(self, integral: Integral | None, weights: np.ndarray, by_time: Callable[[], float] | None = None) -> float:
         """Carry weights of the end to the start, in place; the integral."""
         value, until = 0.0, self.end[0]
         for switch in reversed(self.switches):
@@ -55,7 +57,7 @@ class ContactChain:
             self._across(switch, integral, weights)
         return value
 
-    def _across(self, switch: Switch, integral: Cost | None, weights: np.ndarray) -> None:
+    def _across(self, switch: Switch, integral: Integral | None, weights: np.ndarray) -> None:
         """Carry weights of the state after a switch to that before it, in place."""
         n_x = len(switch.before)
         followed = set(Feedback(self.module, self.request.inputs, ()).names)

@@ -25,6 +25,7 @@ from symdyn.runtime.integrating.contacts import check_overlap
 from symdyn.runtime.integrating.events import not_seen
 from symdyn.runtime.integrating.methods import DEFAULT, check_compiled
 from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.sensitivities import Asked, unseen_jumps
 from symdyn.runtime.integrating.simulate import (
     checked_positive,
@@ -116,7 +117,8 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     names = way.carried
     integral, end = (None if given is None else cost_of(module, what, given, names, p)
                      for what, given in (("the integral", loss.integral), ("the end", loss.end)))
-    t, x = way.forth()
+    measured = None if integral is None else Integral(module, integral, request, method)
+    t, x = way.forth(measured)
     weights, value = np.zeros(len(x) + len(names)), 0.0
     if end is not None:
         at = _cost(end, request, t, x)
@@ -126,12 +128,13 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
         value = float(at.values[0])
     Feedback(module, free, names).fold(t, x, weights)
     if not isinstance(way, Way):
-        value += way.back(integral, weights, lambda: 0.0 if end is None else _by_time(end, request, t, x))
+        value += way.back(measured, weights, lambda: 0.0 if end is None else _by_time(end, request, t, x))
     else:
-        value += way.back(integral, weights)
+        value += way.back(measured, weights)
     if not np.isfinite(value):
         raise EvaluationError(f"{module.name}: the loss is {value:g}")
-    for doubt in (*staying(module, request, np.array([span[0], t]), np.array([start, x]), integral),
+    for doubt in (*([] if measured is None else measured.doubts()),
+                  *staying(module, request, np.array([span[0], t]), np.array([start, x]), integral),
                   *([] if end is None else ending(module, request, t, x, end))):
         warnings.warn(doubt, SimulationWarning, stacklevel=3)
     return Gradient(module.name, asked.names, value, _chosen(asked, names, weights), (t, x), way.n_steps, way.memory,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +22,9 @@ from symdyn.errors import EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.compiled import Run, moved_far, stopped_because
 from symdyn.runtime.integrating.outcome import Request
+from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.run_record import STATUS
-from symdyn.runtime.losses import Cost
+from symdyn.runtime.losses import Costs
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -31,6 +32,14 @@ if TYPE_CHECKING:
 
 # Steps that are tried in a stretch at first; doubled as often as there are more checkpoints than that.
 STRETCH = 128
+# An integrand is measured at the start of one of so many steps, at so many at once.
+SOME, GROUP = 4, 512
+# In how many parts a step is divided where the integrand of a loss needs shorter ones.
+PARTS = 8
+
+
+def _pointers(*arrays: np.ndarray | None) -> list[ctypes.c_void_p]:
+    return [ctypes.c_void_p(None if a is None else a.ctypes.data) for a in arrays]
 
 
 class Feedback:
@@ -76,10 +85,15 @@ class _Steps:
 
 
 class Way:
-    """A run forth and back, across no event; room: bytes up to which steps are kept."""
+    """A run forth and back, across no event.
 
-    def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], room: float) -> None:
+    room    bytes up to which steps are kept; outer: length of the step of a longer run that it divides
+    """
+
+    def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], room: float,
+                 outer: float = 0.0) -> None:
         self.module, self.request, self.carried, self.room = module, request, tuple(carried), room
+        self.method, self.outer = method, outer
         self.feedback = Feedback(module, request.inputs, self.carried)
         unit: Any = module.unit(RightSide(method=method, adjoint=tuple(carried)))
         self.unit, self.run = unit, Run(unit, request)
@@ -99,13 +113,14 @@ class Way:
         self.n_steps, self.memory = 0, 0
         self.end: tuple[float, np.ndarray] = (request.span[0], request.x0)
         self._spare: _Steps | None = None
+        self._rows: list[tuple[np.ndarray, np.ndarray]] = []  # at which the integrand is to be measured
 
-    def forth(self) -> tuple[float, np.ndarray]:
-        """To the end: the time and the state there."""
-        self._spare = self._forth()
+    def forth(self, integral: Integral | None = None) -> tuple[float, np.ndarray]:
+        """To the end: the time and the state there; integral: what is measured on the way, where one stretch is not all."""
+        self._spare = self._forth(integral)
         return self.end
 
-    def back(self, integral: Cost | None, weights: np.ndarray) -> float:
+    def back(self, integral: Integral | None, weights: np.ndarray) -> float:
         """Carry weights of the end, (n_x + n_carried,), to the start, in place; the integral."""
         steps, self._spare = self._spare, None
         assert steps is not None
@@ -133,7 +148,7 @@ class Way:
         self.feedback.fold(t, x, found)
         return found
 
-    def _forth(self) -> _Steps:
+    def _forth(self, integral: Integral | None) -> _Steps:
         """To the end, with checkpoints; room for the steps of a stretch."""
         run, status = self.run, STATUS.STEP_LIMIT if self.run.status == STATUS.DONE else self.run.status  # the start went well
         self.start = run.report().x.copy()
@@ -141,6 +156,8 @@ class Way:
         while status == STATUS.STEP_LIMIT:
             status = self._record(steps)
             self.n_steps += steps.n
+            if integral is not None and (len(self.kept) > 1 or status == STATUS.STEP_LIMIT):
+                self._measure(integral, steps, status != STATUS.STEP_LIMIT)
             if sum(kept.bytes for kept in self.steps.values()) + steps.bytes <= self.room or status != STATUS.STEP_LIMIT:
                 self.steps[len(self.kept) - 1] = steps
                 steps = _Steps.room(self.stretch, self.n_x, self.stages)
@@ -163,6 +180,17 @@ class Way:
             warnings.warn(doubt, SimulationWarning, stacklevel=6)
         return steps
 
+    def _measure(self, integral: Integral, steps: _Steps, last: bool) -> None:
+        """Have the integrand measured at some of the steps, in large groups."""
+        if steps.n:
+            taken = np.append(np.arange(0, steps.n, SOME), steps.n)
+            t = np.append(steps.t[:steps.n], steps.t[steps.n - 1] + steps.h[steps.n - 1])
+            self._rows.append((t[taken], steps.x[taken]))
+        if self._rows and (last or sum(len(t) for t, _ in self._rows) >= GROUP):
+            t, x = (np.concatenate(parts) for parts in zip(*self._rows, strict=True))
+            integral.over_rows(t, x, self.request.inputs.rows(t, x))
+            self._rows = []
+
     def _record(self, steps: _Steps) -> int:
         """Try as many steps as a stretch has, and keep those that are accepted; the status."""
         written = ctypes.c_long(0)
@@ -173,33 +201,77 @@ class Way:
         steps.n = written.value
         return int(status)
 
-    def _back(self, steps: _Steps, times: np.ndarray, states: np.ndarray, integral: Cost | None, weights: np.ndarray) -> float:
+    def _back(self, steps: _Steps, times: np.ndarray, states: np.ndarray, integral: Integral | None,
+              weights: np.ndarray) -> float:
         """Carry the weights back over the steps of a stretch; its part of the integral. times, states: room for the stages."""
         n = steps.n
-        pointers = lambda *arrays: [ctypes.c_void_p(None if a is None else a.ctypes.data) for a in arrays]
         self.unit.function("simulation_stages")(
-            ctypes.c_long(n), *pointers(self.A, self.c, steps.t, steps.h, steps.x, steps.slopes, times, states))
-        of_x, of_others, value = None, None, 0.0
-        if integral is not None and n:
-            at, rows = times[:n].ravel(), states[:n].reshape(-1, self.n_x)
-            costs = integral(at, rows, self._inputs(at, rows))
-            value = float(steps.h[:n] @ costs.values.reshape(n, self.stages) @ self.b)
-            of_x = np.ascontiguousarray(costs.by_x)
-            of_others = None if costs.by is None else np.ascontiguousarray(costs.by)
+            ctypes.c_long(n), *_pointers(self.A, self.c, steps.t, steps.h, steps.x, steps.slopes, times, states))
+        if integral is None or not n:
+            self._over(steps, 0, n, times, states, None, weights)
+            return 0.0
+        h, at, rows = steps.h[:n], times[:n].ravel(), states[:n].reshape(-1, self.n_x)
+        inputs = self._inputs(at, rows)
+        costs = integral(at, rows, inputs)
+        if not integral.weighed:
+            integral.over_stages(h, rows, costs)
+        bad, jumping = integral.judge(h, at, rows, inputs, costs, self.outer)
+        parts = h * (costs.values.reshape(n, self.stages) @ self.b)
+        if not (bad.any() or jumping.any()):
+            self._over(steps, 0, n, times, states, costs, weights)
+            return float(parts.sum())
+        value, end = 0.0, n
+        while end:
+            begin = end - 1
+            while not jumping[end - 1] and begin and bad[begin - 1] == bad[end - 1] and not jumping[begin - 1]:
+                begin -= 1
+            if bad[end - 1]:
+                value += self._finer(steps, begin, end, integral, weights)
+            else:
+                self._over(steps, begin, end, times, states, costs, weights)
+                value += float(parts[begin:end].sum())
+            if jumping[end - 1]:
+                here = slice(begin * self.stages, end * self.stages)
+                gained = integral.across(at[here], rows[here], inputs[here], costs.values[here], steps.slopes[begin, 0])
+                if len(gained):
+                    self.feedback.fold(float(at[here][0]), rows[here][0], gained)
+                    weights += gained
+            end = begin
+        return value
+
+    def _over(self, steps: _Steps, begin: int, end: int, times: np.ndarray, states: np.ndarray, costs: Costs | None,
+              weights: np.ndarray) -> None:
+        """Carry the weights back over some of the steps of a stretch, from `begin` to before `end`; costs: at all stages."""
+        of_x, of_others = None, None
+        if costs is not None:
+            here = slice(begin * self.stages, end * self.stages)
+            of_x = np.ascontiguousarray(costs.by_x[here])
+            of_others = None if costs.by is None else np.ascontiguousarray(costs.by[here])
         places = self.feedback.places
-        feedback = self.feedback.slopes(times[:n].ravel(), states[:n].reshape(-1, self.n_x)) if len(places) else None
-        ends = steps.x[1:]
+        times, states = times[begin:end], states[begin:end]
+        feedback = self.feedback.slopes(times.ravel(), states.reshape(-1, self.n_x)) if len(places) else None
         with self.run.guard:
             reason = self.unit.function("simulation_back")(
-                ctypes.byref(self.run.problem), ctypes.c_long(n),
-                *pointers(self.A, self.b, steps.h, ends, times, states, of_x, of_others), ctypes.c_long(len(places)),
-                *pointers(places, feedback, weights))
+                ctypes.byref(self.run.problem), ctypes.c_long(end - begin),
+                *_pointers(self.A, self.b, steps.h[begin:], steps.x[begin + 1:], times, states, of_x, of_others),
+                ctypes.c_long(len(places)), *_pointers(places, feedback, weights))
         if self.run.trouble:
             raise self.run.trouble[0]
         if reason:
             raise EvaluationError(f"{self.module.name}: the derivatives along the motion cannot be evaluated: "
                                   f"{self.unit.reason(int(reason))}")
         self._note(steps, sum(a.nbytes for a in (times, states, of_x, of_others, feedback) if a is not None))
+
+    def _finer(self, steps: _Steps, begin: int, end: int, integral: Integral, weights: np.ndarray) -> float:
+        """The same over shorter steps in place of some, where the integrand of a loss needs them; their part of the integral."""
+        length = float(np.abs(steps.h[begin:end]).min()) / PARTS
+        part = replace(self.request, span=(float(steps.t[begin]), float(steps.t[end - 1] + steps.h[end - 1])),
+                       x0=steps.x[begin].copy(), first_step=length, max_step=length, times=None)
+        way = Way(self.module, part, self.method, self.carried, self.room, self.outer or float(steps.h[begin:end].min()))
+        way.forth()
+        integral.work -= PARTS + way.n_steps
+        value = way.back(integral, weights)
+        self._note(steps, way.memory)
         return value
 
     def _inputs(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
