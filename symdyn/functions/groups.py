@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 
 from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES
 from symdyn.functions.sensitivities import adjoints_of, functions_of
@@ -25,7 +26,7 @@ _OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
 def written(equations: Equations, functions: Sequence[str] | None, method: str | None) -> tuple[str, ...]:
     """The functions that go into a file: those named, or the standard ones; with what the method of an integrator needs.
 
-    Raises SymdynError for what is no list of names, and for functions that the equations do not have.
+    Raises SymdynError for what is no list of names, ArgumentError for functions that the equations do not have.
     """
     if functions is None:
         standard = (*STANDARD, *(OF_CONSTRAINTS if equations.constraints else ()))
@@ -39,8 +40,10 @@ def written(equations: Equations, functions: Sequence[str] | None, method: str |
         names = tuple(dict.fromkeys((*names, *method_of(method).needs)))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
-        there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
-        raise SymdynError(f"{equations.name} has no function {', '.join(n[:80] for n in unknown)}; it has {there}")
+        there = [n for n in FUNCTIONS if has_function(equations, n)]
+        near = [n for name in unknown for n in difflib.get_close_matches(name, there, 2)]
+        raise ArgumentError(f"{equations.name} has no function {', '.join(n[:80] for n in unknown)}; "
+                            + (f"did you mean {' or '.join(near)}? There are " if near else "it has ") + ", ".join(there))
     return names
 
 

@@ -123,6 +123,8 @@ def test_faults() -> None:
         module.jacobian(0, [0, 0], of=3)
     with pytest.raises(ArgumentError, match="sparsity by 'y' asked for; there are x, inputs, params, t and ud"):
         module.sparsity("y")
+    with pytest.raises(ArgumentError, match=r"has no function inverse_dynamic; did you mean inverse_dynamics\? There are rhs"):
+        module.jacobian(0, [0, 0], of="inverse_dynamic")
     with pytest.raises(SymdynError, match="has no function energy_by_lam"):
         module.evaluate("energy_by_lam", 0, [0, 0])
 
