@@ -88,6 +88,38 @@ def test_friction_block(method: str) -> None:
     assert np.abs(run.sensitivity.of("x") - derivatives(slid, times, at)).max() < 1e-9
 
 
+def _spring(law: sp.Expr) -> Any:
+    x = sd.coordinates("x")
+    system = sd.System("spring")
+    body = system.add_body("body", mass=1)
+    system.add_joint_force(system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x)), law)
+    system.defaults = {symbol: 0.7 for symbol in law.free_symbols if str(symbol) == "p"}
+    return system.compile()
+
+
+def test_parameter_that_moves_a_jump_and_nothing_else() -> None:
+    """A force of 3 until t = p: x(2) = 3 p (2 - p/2), whose derivative by p is 3 (2 - p); without an event it is not seen."""
+    p = sd.parameters("p")
+    module = _spring(sp.Piecewise((3, sd.t < p), (0, True)))
+    with pytest.warns(SimulationWarning, match=r"p moves a jump of the right-hand side, where p - t passes zero, and nothing else"
+                                               r" here.* add an event, system.add_event\(name, p - t\)"):
+        run = module.simulate((0, 2), sensitivities=["p"])
+    assert not run.sensitivity["p"].any()
+    assert run.x[-1, 0] == pytest.approx(3 * 0.7 * (2 - 0.35), rel=1e-6)
+
+
+def test_law_in_pieces_that_does_not_jump() -> None:
+    """A spring with a gap on each side is continuous where its pieces meet."""
+    x, p = sd.coordinates("x"), sd.parameters("p")
+    module = _spring(-x - sp.Piecewise((50 * (x - p), x > p), (50 * (x + p), x < -p), (0, True)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SimulationWarning)
+        run = module.simulate((0, 3), [1.0], sensitivities=["p"], rtol=1e-9)
+    h = 1e-5
+    sides = [module.simulate([0, 3.0], [1.0], params={"p": 0.7 + way * h}, rtol=1e-13).x[-1] for way in (-1, 1)]
+    np.testing.assert_allclose(run.sensitivity["p"][-1], (sides[1] - sides[0]) / (2 * h), rtol=1e-5)
+
+
 def test_jump_without_an_event() -> None:
     with pytest.warns(SimulationWarning, match=r"may jump where x_dot passes zero \(sign\(x_dot\)\).*the sensitivities lack "
                                                r"their jump; add an event, system.add_event\(name, x_dot\)"):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.real_numbers import real_of
 from symdyn.runtime.constraints import holding
 from symdyn.runtime.integrating.at_kinks import staying
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 _INITIAL = re.compile(r"(?P<name>.+)\(0\)")
+# The part of a row up to which the sides of a surface are approached.
+CLOSE = 1e-12
 # An absolute tolerance that no error comes near.
 _ANY = 1e300
 
@@ -123,15 +125,40 @@ class Asked:
         if not self.names:
             return []
         x = outcome.x[:, :module.metadata.sizes.x]
-        return [*self._without_effect(module, outcome), *unseen_jumps(module, request, outcome),
+        return [*self._without_effect(module, request, outcome), *unseen_jumps(module, request, outcome),
                 *staying(module, request, outcome.t, x)]
 
-    def _without_effect(self, module: Module, outcome: Outcome) -> list[str]:
+    def _without_effect(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
         n_x = module.metadata.sizes.x
         rows = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x) if self.names else np.zeros((0, 0, n_x))
         nothing = [name for k, name in enumerate(self.names) if len(rows) > 1 and not rows[:, k].any()]
-        return [f"{module.name}: nothing in this motion depends on {', '.join(nothing)}: the sensitivities are zero"] \
-            if nothing else []
+        moved = _moving_jumps(module, request, outcome, nothing)
+        nothing = [name for name in nothing if name not in moved]
+        found = [f"{module.name}: {name} moves a jump of the right-hand side, where {surface} passes zero, and nothing else "
+                 "here: without an event there its sensitivity is zero, which is that between jumps; add an event, "
+                 f"system.add_event(name, {surface})" for name, surface in moved.items()]
+        if nothing:
+            found.append(f"{module.name}: nothing in this motion depends on {', '.join(nothing)}: the sensitivities are zero")
+        return found
+
+
+def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Sequence[str]) -> dict[str, str]:
+    """Those of some parameters and inputs that what passes zero at a jump depends on -> the first such surface that passes it."""
+    metadata = module.metadata
+    asked = [name for name in names if name in metadata.parameters or name in metadata.inputs]
+    if not metadata.switches or not asked:
+        return {}
+    t, x = outcome.t, outcome.x[:, :metadata.sizes.x]
+    inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), len(metadata.inputs)))
+    signs = np.sign(module.evaluate("switches", t, x, request.p, inputs))
+    found: dict[str, str] = {}
+    for k, jump in enumerate(metadata.switches):
+        for row in np.flatnonzero(signs[1:, k] * signs[:-1, k] <= 0)[:1]:
+            J = module.jacobian(t[row], x[row], request.p, inputs[row], ["params", "inputs"], "switches")
+            by = np.hstack([np.asarray(J.params)[k], np.asarray(J.inputs)[k]])
+            known = dict(zip((*metadata.parameters, *metadata.inputs), by, strict=True))
+            found |= {name: jump.surface for name in asked if known[name] and name not in found}
+    return found
 
 
 def _depend_on_state(request: Request) -> set[int]:
@@ -154,11 +181,32 @@ def unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str
     for k, jump in enumerate(known):
         for row in np.flatnonzero(signs[1:, k] * signs[:-1, k] < 0):
             begin, end = sorted(outcome.t[row:row + 2])
-            if not any(begin <= one.t <= end for one in outcome.happened):
+            if not any(begin <= one.t <= end for one in outcome.happened) and _jumps(module, request, outcome.t, x, int(row), k):
                 return [f"{module.name}: the right-hand side may jump where {jump.surface} passes zero ({jump.what}), as near "
                         f"t = {end:.6g} s, without an event there: the sensitivities lack their jump; add an event, "
                         f"system.add_event(name, {jump.surface})"]
     return []
+
+
+def _jumps(module: Module, request: Request, t: np.ndarray, x: np.ndarray, row: int, k: int) -> bool:
+    """Whether the right-hand side jumps where a surface passes zero between two rows of a motion, on the chord from one to the
+    other; that of a law in pieces may be continuous there."""
+    begin, end = 0.0, 1.0
+    at = lambda part: (t[row] + part * (t[row + 1] - t[row]), x[row] + part * (x[row + 1] - x[row]))
+
+    def value(what: str, part: float) -> np.ndarray:
+        time, state = at(part)
+        return module.evaluate(what, time, state, request.p, request.inputs.rows(np.array([time]), state[None, :])[0])
+
+    try:
+        sign = np.sign(value("switches", begin)[k])
+        while end - begin > CLOSE:
+            middle = 0.5 * (begin + end)
+            begin, end = (middle, end) if np.sign(value("switches", middle)[k]) == sign else (begin, middle)
+        before, after = value("rhs", begin), value("rhs", end)
+    except EvaluationError:
+        return True
+    return bool((np.abs(after - before) > np.sqrt(CLOSE) * max(np.abs(before).max(), np.abs(after).max())).any())
 
 
 def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
