@@ -127,7 +127,12 @@ class MissingExtra(SymdynError, ImportError):
 
 
 class NoEquilibrium(SymdynError, ArithmeticError):
-    """No state of rest was found; the message says what is left, in numbers."""
+    """No state of rest, or no periodic motion, was found; the message says what is left, in numbers. `found` holds the motions
+    that were found before, where several were to be followed."""
+
+    def __init__(self, message: str = "", found: Sequence[object] = ()) -> None:
+        super().__init__(message)
+        self.found = list(found)
 
 
 class EquilibriumNotUnique(NoEquilibrium):

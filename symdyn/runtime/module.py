@@ -960,7 +960,8 @@ class Module:
                  method: str = "dop853") -> PeriodicMotion:
         """A periodic motion near a start, by shooting with exact sensitivities.
 
-        period    s: where the time appears in the equations that of the motion, else a guess, found with the start
+        period    s: where the time appears in the equations that of the motion, a multiple of that of the drive; else a guess,
+                  found with the start, of the smallest period or of a multiple of it
         q, u, z   near the motion, as for `simulate`; t: the time there; inputs: constants
         advance   what coordinates gain in a period, by name or symbol: 2 pi for a wheel that turns once
         cyclic    coordinates that nothing depends on and that need not come back, such as the way of a walker
@@ -969,8 +970,9 @@ class Module:
         rtol, method   of the integration, a compiled method
 
         On constraints, across events and across the switches and impacts of rigid contacts; the start lies between two of these.
-        See symdyn.statics.periodic.PeriodicMotion for the multipliers, and `follow`, over a parameter. Raises NoEquilibrium where
-        none is found, with what is left, ArgumentError for what does not fit.
+        Returns a PeriodicMotion with `period`, `x` (the start), `params` and `multipliers`; see there for `follow`, over a
+        parameter. Raises NoEquilibrium where none is found, with what is left, ArgumentError for what does not fit: also for a
+        period with which the equations are not periodic. Warns of jumps that the multipliers lack, as `simulate` does.
 
         >>> q = sd.coordinates("q")
         >>> system = sd.System("van_der_pol")

@@ -55,8 +55,8 @@ def branch(motion: PeriodicMotion, name: Any, least: Any, most: Any, step: Any, 
             length *= SHORTER
             if length < SHORTEST * longest:
                 raise NoEquilibrium(f"{module.name}: the branch of periodic motions over {asked} is lost after {len(found)} "
-                                    "motions, at "
-                                    f"{asked} = {at.motion.params[place]:.6g}; it may end there, or branch off")
+                                    f"motions, at {asked} = {at.motion.params[place]:.6g}; it may end there, or branch off; the "
+                                    "error has these motions as found", found)
             continue
         there, iterations = reached
         if not low <= there.params[place] <= high:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,13 @@ LATEST, RETURNS = 1.5, 601
 STILL, AT_REST = 1e-6, 1e2
 # Directions that a start may change in: singular values of the projection beyond this part of the largest.
 TANGENT = 1e-6
+# The equations are compared with those a period later at so many times, of which none is a simple part of a period; how much, of
+# the largest rate, they may differ.
+SAMPLES, PERIODIC = 38, 1e-6
+# At how many times a motion whose right-hand side may jump is looked at.
+WATCHED = 201
+# What is said of initial values that nothing depends on, such as those of a coordinate that is prescribed: nothing is wrong.
+IDLE = "nothing in this motion depends on"
 # What a change of a cyclic coordinate may change of the rest, by its size.
 CYCLIC = 1e-6
 
@@ -91,7 +99,8 @@ class PeriodicMotion:
         """The periodic motions at other values of a parameter, one after the other, each sought from the one before along its
         derivative by the parameter.
 
-        Raises ArgumentError for an unknown parameter, NoEquilibrium where the way ends, with the value.
+        Raises ArgumentError for an unknown parameter, NoEquilibrium where the way ends, with the value; the motions until then
+        are its `found`.
         """
         parameters = list(self.module.metadata.parameters)
         asked = name_of(name)
@@ -99,17 +108,19 @@ class PeriodicMotion:
             raise ArgumentError(f"{self.module.name}: a periodic motion was to be followed over {shown(asked)}, which is no "
                                 f"parameter; there are {', '.join(parameters)}")
         point = parameters.index(asked)
-        found, motion = [], self
+        found: list[PeriodicMotion] = []
+        motion = self
         for value in real_of(values, self.module.name, "the values of the parameter must be numbers").ravel():
             problem = motion._problem
-            change = problem.derivative(motion.x, motion.period, asked) * (value - motion.params[point])
             p = motion.params.copy()
             p[point] = value
             try:
+                change = problem.derivative(motion.x, motion.period, asked) * (value - motion.params[point])
                 motion = replace(problem, p=p).solve(motion.x + change[:-1], motion.period + change[-1])
-            except NoEquilibrium as error:
-                raise NoEquilibrium(f"{error}; at {asked} = {value:g}, followed from {asked} = "
-                                    f"{motion.params[point]:g}") from None
+            except (NoEquilibrium, EvaluationError, ProjectionFailed, ArgumentError) as error:
+                so_far = f"; the {len(found)} motions before it are the error's found" if found else ""
+                raise NoEquilibrium(f"{error}; at {asked} = {value:g}, followed from {asked} = {motion.params[point]:g}{so_far}",
+                                    found) from None
             found.append(motion)
         return found
 
@@ -205,6 +216,15 @@ class _Problem:
         A state of rest comes back after any time, and where motions of all amplitudes are periodic Newton's method may end in one
         or go from one to the next; then the period of the motion from this start is sought.
         """
+        try:
+            return self.near(x, period)
+        except NoEquilibrium:
+            with suppress(EvaluationError, ProjectionFailed):
+                self.check_drive(self.start(x), period)
+            raise
+
+    def near(self, x: np.ndarray, period: float) -> PeriodicMotion:
+        """The same where the equations are periodic."""
         why = at_rest = None
         for fixed in (False, True) if self.free else (False,):
             try:
@@ -295,14 +315,36 @@ class _Problem:
 
     def shot(self, x: np.ndarray, period: float) -> _Shot:
         """Where a start is after a period, with what it depends on. Raises EvaluationError where the motion stops early."""
-        run = self.solution(x, period, 2, [f"{name}(0)" for name in self.module.metadata.x])
+        rows = WATCHED if self.module.metadata.switches else 2  # jumps are seen from row to row
+        run, doubts = self.watched(x, period, rows, [f"{name}(0)" for name in self.module.metadata.x])
         S = run.sensitivity.matrix
         self.check_cyclic(S[-1])
         left, sizes, _ = np.linalg.svd(self.keeps[:, None] * S[0])
         basis = left[:, sizes > TANGENT * sizes[0]]
         before, after = (run._phases[0].p, run._phases[-1].p) if run._phases else (self.p, self.p)
         return _Shot(x, period, run.x[-1], self.back @ S[-1] @ basis, basis, self.back @ run.x[-1] - self.keeps * x - self.moves,
-                     self.keeps * self.rate(self.t, x, before), self.back @ self.rate(self.t + period, run.x[-1], after))
+                     self.keeps * self.rate(self.t, x, before), self.back @ self.rate(self.t + period, run.x[-1], after), doubts)
+
+    def check_drive(self, x: np.ndarray, period: float) -> None:
+        """Raise ArgumentError where the equations at the states of the motion from a start are others after the period."""
+        if self.free:
+            return
+        run = self.solution(x, period, SAMPLES)
+        times, states = run.t[1:-1], run.x[1:-1]
+        inputs = () if self.inputs is None else self.inputs
+        events = self.module.metadata.events
+        for what, there in (("rhs", True), ("events", bool(events)), ("event_resets", any(event.reset for event in events))):
+            if not there:
+                continue
+            now, then = (np.asarray(self.module.evaluate(what, t, states, self.p, inputs)).reshape(len(times), -1)
+                         for t in (times, times + period))
+            away, sizes = np.abs(then - now), np.maximum(np.abs(now), np.abs(then)).max(axis=0)
+            row, entry = np.unravel_index(int((away / np.maximum(sizes, 1e-300)).argmax()), away.shape)
+            if away[row, entry] > PERIODIC * sizes[entry]:
+                name = f"the rate of {self.module.metadata.x[entry]}" if what == "rhs" else f"an event ({what}, {entry + 1})"
+                raise ArgumentError(f"{self.module.name}: the equations are not periodic with {period:.9g} s: in the same state "
+                                    f"{name} is {now[row, entry]:.6g} at t = {times[row]:.6g} s and {then[row, entry]:.6g} "
+                                    "after that time; the period must be that of what drives the motion, or a multiple of it")
 
     def check_cyclic(self, S: np.ndarray) -> None:
         """Raise ArgumentError for coordinates that were said to be cyclic and are not; S: derivatives of the end."""
@@ -341,6 +383,9 @@ class _Problem:
         return found + np.append(by[0], 0.0)
 
     def found(self, at: _Shot, iterations: int) -> PeriodicMotion:
+        self.check_drive(at.x, at.period)
+        for doubt in at.doubts:
+            warnings.warn(doubt, SimulationWarning, stacklevel=2)
         multipliers = np.linalg.eigvals(at.basis.T @ at.moved)
         multipliers = multipliers[np.argsort(-np.abs(multipliers))]
         left = float(np.abs(at.gap).max())
@@ -348,15 +393,23 @@ class _Problem:
 
     def solution(self, x: np.ndarray, period: float, n: int, by: Sequence[str] | None = None) -> Solution:
         """A motion over a period. Raises EvaluationError where it stops early."""
+        return self.watched(x, period, n, by)[0]
+
+    def watched(self, x: np.ndarray, period: float, n: int, by: Sequence[str] | None = None) -> tuple[Solution, tuple[str, ...]]:
+        """The same, with what is warned of in it."""
         sizes = self.module.metadata.sizes
         times = np.linspace(self.t, self.t + period, n)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SimulationWarning)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SimulationWarning)
             run = self.module.simulate(times, x[:sizes.q], x[sizes.q:sizes.q + sizes.u], self.p, z=x[sizes.q + sizes.u:],
                                        inputs=self.inputs, rtol=self.rtol, method=self.method, sensitivities=by)
         if not run.success or run.t[-1] != times[-1]:
             raise EvaluationError(f"{self.module.name}: the motion does not last for a period: {run.message}")
-        return run
+        for other in caught:
+            if not issubclass(other.category, SimulationWarning):
+                warnings.warn(other.message, stacklevel=3)
+        doubts = [str(one.message) for one in caught if issubclass(one.category, SimulationWarning)]
+        return run, tuple(text for text in doubts if IDLE not in text)
 
 
 def _size(x: np.ndarray, end: np.ndarray) -> float:
@@ -365,7 +418,8 @@ def _size(x: np.ndarray, end: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Shot:
-    """A motion from x over a time: its end, what that is moved by the directions of `basis`, the gap, the rates at both ends."""
+    """A motion from x over a time: its end, what that is moved by the directions of `basis`, the gap, the rates at both ends,
+    what was warned of."""
 
     x: np.ndarray
     period: float
@@ -375,5 +429,6 @@ class _Shot:
     gap: np.ndarray
     rate: np.ndarray
     late: np.ndarray
+    doubts: tuple[str, ...]
 
 

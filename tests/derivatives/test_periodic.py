@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.errors import ArgumentError, NoEquilibrium, SimulationWarning
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.statics import branches
 
@@ -267,3 +268,79 @@ def test_what_is_not_found() -> None:
         oscillator().periodic(-1)
     with pytest.raises(ArgumentError, match="advance"):
         oscillator().periodic(6, advance={"nothing": 1})
+
+
+@cache
+def driven() -> Any:
+    """A pendulum with damping that is driven by a cos w t."""
+    angle = sd.coordinates("angle")
+    a, w = sd.parameters("a w")
+    system = sd.System("driven", gravity=[0, -9.81])
+    body = system.add_body("body", mass=1, com=[0, -1])
+    hinge = system.add_joint(sd.Revolute("hinge", system.ground, body, angle))
+    system.add_joint_force(hinge, a * sp.cos(w * sd.t) - 0.5 * angle.dot)
+    system.defaults = {a: 4, w: 2}
+    return system.compile()
+
+
+def test_a_period_that_the_drive_does_not_have() -> None:
+    """cos 2t has the period pi, and multiples of it; a start that comes back after 3 s is no periodic motion."""
+    message = "the equations are not periodic with 3 s: in the same state the rate of angle_dot is .*; the period must be that of"
+    with pytest.raises(ArgumentError, match=message):
+        driven().periodic(3.0, [0], [0])
+    once, twice = driven().periodic(np.pi, [0], [0]), driven().periodic(2 * np.pi, [0], [0])
+    np.testing.assert_allclose(twice.x, once.x, atol=1e-7)
+    np.testing.assert_allclose(np.sort(np.abs(twice.multipliers)), np.sort(np.abs(once.multipliers)) ** 2, rtol=1e-5)
+    # The product of the multipliers is exp of the integral of the divergence -0.5 (Liouville).
+    assert np.prod(once.multipliers).real == pytest.approx(np.exp(-0.5 * np.pi), rel=1e-7)
+    with pytest.raises(NoEquilibrium, match=r"not periodic with 3.14159265 s.*at w = 2.1, followed from w = 2"):
+        once.follow("w", [2.1])
+
+
+def test_what_was_found_is_kept_where_one_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    once = driven().periodic(np.pi, [0], [0])
+    solve = type(once._problem).solve
+    place = list(driven().metadata.parameters).index("a")
+
+    def fails(self: Any, x: np.ndarray, period: float) -> Any:
+        if self.p[place] > 4.2:
+            raise NoEquilibrium("lost")
+        return solve(self, x, period)
+
+    monkeypatch.setattr(type(once._problem), "solve", fails)
+    with pytest.raises(NoEquilibrium, match=r"lost; at a = 4.3, followed from a = 4.2; the 2 motions before it are the error's fo"
+                       ) as caught:
+        once.follow("a", [4.1, 4.2, 4.3])
+    found: Any = caught.value.found
+    assert [float(one.params[place]) for one in found] == [4.1, 4.2]
+    assert np.abs(found[1].simulate(2).x[-1] - found[1].x).max() < 1e-6
+
+
+@cache
+def rubbing(event: bool) -> Any:
+    """A mass with dry friction that is driven: it turns twice in a period."""
+    q = sd.coordinates("q")
+    a = sd.parameters("a")
+    system = sd.System("rubbing")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+    system.add_joint_force(slide, a * sp.cos(2.5 * sd.t) - 9 * q - 0.3 * sp.sign(q.dot))
+    system.defaults = {a: 4}
+    if event:
+        system.add_event("turns", q.dot)
+    return system.compile()
+
+
+def test_multipliers_that_lack_a_jump_are_warned_of() -> None:
+    period = 2 * np.pi / 2.5
+    with pytest.warns(SimulationWarning, match="may jump where q_dot passes zero .*the sensitivities lack their jump"):
+        wrong = rubbing(False).periodic(period, [0], [0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SimulationWarning)
+        right = rubbing(True).periodic(period, wrong.x[:1], wrong.x[1:])
+    h = 1e-5
+    ends = [[rubbing(True).simulate([0, period], [x[0]], [x[1]], rtol=1e-12).x[-1]
+             for x in (right.x - h * unit, right.x + h * unit)] for unit in np.eye(2)]
+    expected = np.linalg.eigvals(np.column_stack([(late - early) / (2 * h) for early, late in ends]))
+    np.testing.assert_allclose(np.sort_complex(right.multipliers), np.sort_complex(expected), atol=1e-5)
+    assert np.abs(np.sort_complex(wrong.multipliers) - np.sort_complex(expected)).max() > 1e-3
