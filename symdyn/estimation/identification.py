@@ -32,7 +32,8 @@ class Identification(Estimate):
     noise        standard deviation of the forces by speed, given or estimated, N or N m; with a motion's noise that of tau alone
     condition    of the regressor with columns of length 1: how many times noise is amplified in the worst combination
     undetermined   combinations, each unknown counted in what changes the forces as much (with nominal values: relative to these),
-                 that the data do not determine: text, from the singular vectors
+                 that the data do not determine: text, from the singular vectors; shares below a thousandth of the largest are
+                 left out
     residuals    of every motion: measured less computed forces along the speeds, (n_t, n_u), as filtered and kept; with
                  constraints along the motions that these allow, (n_t, r), by orthonormal directions
     consistent   whether the values are those of bodies that can exist; degrees: of freedom; known_noise: whether it was given

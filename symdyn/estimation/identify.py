@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from symdyn.errors import ArgumentError
 from symdyn.estimation.allowed import allowed
-from symdyn.estimation.estimate import combination
+from symdyn.estimation.estimate import combination, echelon
 from symdyn.estimation.identification import Identification
 from symdyn.estimation.measured_motion import MeasuredMotion, Rows, rows_of
 from symdyn.estimation.pseudo_inertia import Chart, is_consistent, nearest
@@ -104,7 +103,7 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
     found = _Solution.of(system, deviations, charts, float(spread))
     return Identification(module, dict(zip(labels, found.values.tolist(), strict=True)), found.covariance,
                           dict(zip(module.metadata.u, found.noise.tolist(), strict=True)), found.condition,
-                          tuple(combination(v, labels) for v in _echelon(found.open_ones)), tuple(system.residuals(found.values)),
+                          tuple(combination(v, labels) for v in echelon(found.open_ones)), tuple(system.residuals(found.values)),
                           consistent, found.degrees, noise is not None)
 
 
@@ -221,14 +220,6 @@ class _Solution:
         half = np.linalg.solve(root.T, T.T).T
         directions = V[is_open] @ T.T / np.sqrt(np.sum(T**2, axis=1))
         return cls(origin + T @ x, half @ half.T, noise, condition, directions, len(y) - int(np.sum(~is_open)))
-
-
-def _echelon(directions: np.ndarray) -> np.ndarray:
-    """Other directions that span the same, each with an entry of its own, which is 1: fewer of their entries differ from zero."""
-    if not len(directions):
-        return directions
-    pivots = qr(directions, mode="r", pivoting=True)[1][:len(directions)]
-    return np.linalg.solve(directions[:, pivots], directions)
 
 
 def _lengths(A: np.ndarray) -> np.ndarray:

@@ -118,6 +118,15 @@ def test_what_runs_off_is_no_minimum() -> None:
     assert sd.fit(module, sd.Experiment(truth.t, {"q1": truth.q[:, 0]}, q=[0.5]), ["l"], start={"l": 0.7}).success
 
 
+@pytest.mark.parametrize(("level", "text"), [
+    (95, "found 95.0; pass a probability, such as 0.95"), (-1, "found -1"), (0, "found 0"), (1.0, "found 1"),
+    (float("nan"), "found nan"), ("a", "found 'a'"), (True, "found True")])
+def test_levels_that_are_no_probability(level: Any, text: str) -> None:
+    with pytest.raises(ArgumentError, match="damped: the level of confidence must be a number between 0 and 1, ") as found:
+        sd.fit(damped(), measured(0), ["d"]).confidence(level)
+    assert text in str(found.value)
+
+
 def test_picture(tmp_path: Path) -> None:
     found = sd.fit(damped(), [measured(1), measured(2)], ["d", "m"])
     figure = found.plot(tmp_path / "fit.png")

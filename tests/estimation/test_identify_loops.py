@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 import symdyn as sd
 from symdyn.errors import ArgumentError
@@ -57,6 +59,22 @@ def test_identified_parameters_predict_another_motion() -> None:
     start = linkage().evaluate("base_parameters", 0.0, np.zeros(6))
     assert np.abs(crank(start, 1) - exact)[turning].max() > 0.05 * np.abs(exact).max()
     assert found.residuals[0].shape == (len(T), 1) and np.abs(found.residuals[0]).max() < 1e-6
+
+
+def test_open_combinations_are_named_with_all_their_parts() -> None:
+    """What is printed has no effect on the forces along the motion that the loop allows, to the three digits that are printed."""
+    q, u, ud, tau = motion()
+    found = sd.identify(linkage(), sd.MeasuredMotion(T, q, tau, u, ud), noise=1e-3)
+    Y = linkage().evaluate("base_regressor", T, np.hstack([q, u]), ud=ud)
+    rows = linkage().evaluate("C_r", T, np.hstack([q, u]))
+    A = np.array([null_space(C)[:, 0] @ Y[k] for k, C in enumerate(rows)])
+    A /= np.linalg.norm(A, axis=0)
+    names = list(found.values)
+    for text in found.undetermined:
+        direction = np.zeros(len(names))
+        for sign, share, name in re.findall(r"(-?) ?([\d.e-]+) (\w+)", text):
+            direction[names.index(name)] = float(sign + share)
+        assert np.linalg.norm(A @ direction) < 5e-3 * np.linalg.norm(direction), text
 
 
 def test_covariance_of_noisy_torques() -> None:
