@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +22,8 @@ _SHARE = 1e-3
 
 
 class Estimate:
-    """What estimates have in common: the module, values (label -> value), covariance (n, n) in this order, degrees of freedom (residuals less
-    unknowns), and known_noise, whether the noise of the data was given."""
+    """What estimates have in common: the module, values (label -> value), covariance (n, n) in this order, degrees of freedom
+    (residuals less unknowns), and known_noise, whether the noise of the data was given."""
 
     module: Module
     values: Mapping[str, float]

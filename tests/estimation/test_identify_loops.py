@@ -62,19 +62,17 @@ def test_identified_parameters_predict_another_motion() -> None:
 
 
 def test_open_combinations_are_named_with_all_their_parts() -> None:
-    """What is printed has no effect on the forces along the motion that the loop allows, to the three digits that are printed."""
+    """The parts are those of the null space of the forces along the motion that the loop allows, columns counted alike."""
     q, u, ud, tau = motion()
     found = sd.identify(linkage(), sd.MeasuredMotion(T, q, tau, u, ud), noise=1e-3)
     Y = linkage().evaluate("base_regressor", T, np.hstack([q, u]), ud=ud)
     rows = linkage().evaluate("C_r", T, np.hstack([q, u]))
     A = np.array([null_space(C)[:, 0] @ Y[k] for k, C in enumerate(rows)])
-    A /= np.linalg.norm(A, axis=0)
-    names = list(found.values)
-    for text in found.undetermined:
-        direction = np.zeros(len(names))
-        for sign, share, name in re.findall(r"(-?) ?([\d.e-]+) (\w+)", text):
-            direction[names.index(name)] = float(sign + share)
-        assert np.linalg.norm(A @ direction) < 5e-3 * np.linalg.norm(direction), text
+    V = null_space(A / np.linalg.norm(A, axis=0), rcond=1e-9)[:, 0]
+    expected = {name: share for name, share in zip(found.values, V / V[np.abs(V).argmax()], strict=True) if abs(share) > 1e-3}
+    text, = found.undetermined
+    parts = {name: float(sign + share) for sign, share, name in re.findall(r"(-?) ?([\d.e-]+) (\w+)", text)}
+    assert len(parts) == 6 and parts == pytest.approx(expected, rel=5e-3)
 
 
 def test_covariance_of_noisy_torques() -> None:
