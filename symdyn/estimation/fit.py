@@ -1,25 +1,19 @@
-"""Parameters and initial values from measured motions, by least squares with exact sensitivities.
-
-The residuals are (model - measured)/standard deviation, and (value - mean)/standard deviation of priors. Their derivatives are
-the sensitivities of the motion, integrated along with it, so that a step costs one run an experiment. Source: Nocedal and Wright,
-Numerical Optimization, 2nd ed., chapter 10 (Gauss-Newton in a trust region, which is what Levenberg and Marquardt do); Branch,
-Coleman and Li (1999) for bounds, as in scipy.optimize.least_squares.
-"""
+"""Parameters and initial values from measured motions, by least squares with exact sensitivities."""
 
 from __future__ import annotations
 
 import difflib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning, SymdynError
+from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.estimation.experiment import Experiment, Measured, taken
-from symdyn.estimation.result import Fit, Unknown
+from symdyn.estimation.minimum import minimum
+from symdyn.estimation.problem import Problem, Unknown
+from symdyn.estimation.result import Fit
 from symdyn.estimation.starts import Start, moves
 from symdyn.real_numbers import number_of
 from symdyn.runtime.inputs.inputs import inputs_at
@@ -30,12 +24,6 @@ from symdyn.shown import name_of, shown
 if TYPE_CHECKING:
     from symdyn.given import Named, Names
     from symdyn.runtime.module import Module
-    from symdyn.runtime.solutions.solution import Solution
-
-
-
-# Relative changes of the sum of squares and of the unknowns at which the iteration ends.
-PRECISION = 1e-10
 
 
 def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Names = (), initial: Names = (),
@@ -51,15 +39,17 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
                  the first that the constraints leave free follow from them, for every value that is tried
     bounds       name -> (least, most) of a parameter, or of an initial value, as "q1(0)"; masses of bodies are positive anyway
     priors       name -> (mean, standard deviation): what is known of it apart from the data
-    noise        standard deviation of what was measured, for all or by name; None: the same for all, estimated from what the fit
-                 leaves over
+    noise        standard deviation of what was measured, for all or by name; None: estimated for each by its name, from what the
+                 fit leaves over, and at least what the runs are exact to; priors keep their deviations
     start        guesses of parameters; default: their defaults
     rtol, method   of the runs (a compiled method)
-    max_steps    of the iteration, at most
+    max_steps    of an iteration, at most
 
     Parameters are scaled by their guesses. A motion that cannot be computed is a step that is not taken. The minimum is one near
-    the guess: over long records of chaotic motion there are many. Raises ArgumentError with all faults for what does not fit,
-    EvaluationError where the motion from the guess cannot be computed.
+    the guess: over long records of chaotic motion there are many. Combinations that the data leave open stay at the guess, and
+    what the data press against a bound is on it. A fit that ends at no minimum is reported by a SimulationWarning. Raises
+    ArgumentError with all faults for what does not fit, EvaluationError where the motion from the guess cannot be computed. See
+    symdyn.estimation.minimum for the method and its sources.
 
     >>> module = sd.systems.pendulum().compile()
     >>> truth = module.simulate(np.linspace(0, 2, 50), q=[0.5], params={"l": 1.3})
@@ -72,144 +62,27 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise ArgumentError(f"{module.name}: max_steps is {shown(max_steps)}; pass a whole number from 1 on")
     problem = _problem(module, experiments, parameters, initial, bounds, priors, noise, start, rtol, method)
-    guess = np.array([unknown.guess for unknown in problem.unknowns])
-    first = problem.residuals(guess)
+    doubts: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as doubts:
+            warnings.simplefilter("always")
+            first = problem.residuals(problem.guess)
+    finally:
+        for doubt in doubts:
+            if issubclass(doubt.category, SimulationWarning):  # at the line of the caller
+                warnings.warn(str(doubt.message), doubt.category, stacklevel=2)
+            else:
+                warnings.warn_explicit(doubt.message, doubt.category, doubt.filename, doubt.lineno, source=doubt.source)
     if not np.isfinite(first).all():
         raise EvaluationError(f"{module.name}: no motion from the guess of the fit, {problem.failure}; take another start")
-    found = least_squares(problem.residuals, guess, problem.jacobian, (problem.least, problem.most), "trf", x_scale=problem.scale,
-                          max_nfev=max_steps, ftol=PRECISION, xtol=PRECISION, gtol=PRECISION)
-    return problem.result(found)
-
-
-@dataclass
-class _Problem:
-    """Residuals of all experiments as functions of the unknowns.
-
-    scale   of the unknowns; least, most: their bounds
-    noise   standard deviation by what was measured; known: whether it was given
-    starts  of the experiments on the constraints; None where a start is as it is given, with unknown values put in
-    """
-
-    module: Module
-    experiments: list[Measured]
-    unknowns: list[Unknown]
-    scale: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-    priors: list[tuple[int, float, float]]
-    noise: Mapping[str, float]
-    known: bool
-    rtol: float
-    method: str
-    starts: list[Start | None]
-    failure: str = ""
-    runs: int = 0
-
-    def __post_init__(self) -> None:
-        self._at: np.ndarray | None = None
-        self._motions: list[Solution] = []
-
-    def residuals(self, values: np.ndarray) -> np.ndarray:
-        """(n,), NaN where a motion cannot be computed: such a step is not taken."""
-        if not self._moved(values):
-            return np.full(self.n, np.nan)
-        rows = [((self._model(k, name) - measured)[present] / self.noise[name])
-                for k, name, measured, present in self._parts()]
-        return np.concatenate([*rows, [(values[i] - mean) / deviation for i, mean, deviation in self.priors]])
-
-    def jacobian(self, values: np.ndarray) -> np.ndarray:
-        """Derivatives of the residuals by the unknowns, (n, n_unknowns)."""
-        self._moved(values)
-        blocks = []
-        for k, name, _, present in self._parts():
-            block = np.zeros((int(present.sum()), len(self.unknowns)))
-            columns = [i for i, unknown in enumerate(self.unknowns) if unknown.experiment in (None, k)]
-            block[:, columns] = self._motions[k].sensitivity.of(name)[present] / self.noise[name]
-            blocks.append(block)
-        of_priors = np.zeros((len(self.priors), len(self.unknowns)))
-        for row, (i, _, deviation) in zip(of_priors, self.priors, strict=True):
-            row[i] = 1 / deviation
-        return np.vstack([*blocks, of_priors])
-
-    @property
-    def n(self) -> int:
-        """Number of residuals."""
-        return sum(e.n for e in self.experiments) + len(self.priors)
-
-    def result(self, found: Any) -> Fit:
-        """The fit, from what least_squares returns."""
-        self._moved(found.x)
-        left = {(k, name): np.where(present, measured - self._model(k, name), np.nan)
-                for k, name, measured, present in self._parts()}
-        return Fit.of(self.module, self.unknowns, found, self.scale, self.known, list(self._motions), left, self.runs)
-
-    def _parts(self) -> list[tuple[int, str, np.ndarray, np.ndarray]]:
-        return [(k, name, values, np.isfinite(values)) for k, e in enumerate(self.experiments)
-                for name, values in e.values.items()]
-
-    def _model(self, k: int, name: str) -> np.ndarray:
-        motion = self._motions[k]
-        return motion[name] if name in motion.module.metadata.x else motion.outputs[name]
-
-    def _moved(self, values: np.ndarray) -> bool:
-        """Runs the experiments with these values, unless they were run with them last; False where one cannot be run."""
-        if self._at is None or not np.array_equal(values, self._at):
-            self.runs += 1
-            self._at = None
-            try:
-                with warnings.catch_warnings():
-                    if self.runs > 1:  # what warnings say of a motion they said of the first; why one ends is in `failure`
-                        warnings.simplefilter("ignore", SimulationWarning)
-                    motions = [self._run(k, values) for k in range(len(self.experiments))]
-            except SymdynError as error:
-                if isinstance(error, ArgumentError) and self.runs == 1:
-                    raise  # what was asked is at fault, not where the iteration has gone
-                self.failure = str(error)
-                return False
-            stopped = next((m for m in motions if not m.success), None)
-            if stopped is not None:
-                self.failure = stopped.message
-                return False
-            self._at, self._motions = values.copy(), motions
-        return True
-
-    def _run(self, k: int, values: np.ndarray) -> Solution:
-        experiment = self.experiments[k].experiment
-        mine = [(unknown, float(v)) for unknown, v in zip(self.unknowns, values, strict=True) if unknown.experiment in (None, k)]
-        params = {**{str(name_of(key)): value for key, value in experiment.params.items()},
-                  **{u.name: v for u, v in mine if u.experiment is None}}
-        initial = {u.state: v for u, v in mine if u.experiment is not None}
-        start = self.starts[k]
-        asked: Any = [u.asked for u, _ in mine]
-        if start is None:
-            given = self._start(k, initial)
-        else:
-            p = self.module.parameters(params)
-            x = start.at(initial, p)
-            sizes = self.module.metadata.sizes
-            given = dict(zip(("q", "u", "z"), np.split(x, [sizes.q, sizes.q + sizes.u]), strict=True))
-            asked = {u.asked: start.derivative(x, p, u.state) for u, _ in mine}
-        return self.module.simulate(self.experiments[k].t, **given, params=params, inputs=experiment.inputs, rtol=self.rtol,
-                                    method=self.method, sensitivities=asked)
-
-    def _start(self, k: int, unknown: Mapping[str, float]) -> dict[str, Any]:
-        """q, u and z of an experiment, with the unknown initial values put in."""
-        experiment, metadata = self.experiments[k].experiment, self.module.metadata
-        result: dict[str, Any] = {}
-        for group in ("q", "u", "z"):
-            given, names = getattr(experiment, group), getattr(metadata, group)
-            mine = {name: unknown[name] for name in names if name in unknown}
-            if not mine:
-                result[group] = given
-            elif given is None or isinstance(given, Mapping):
-                result[group] = {**({str(name_of(key)): v for key, v in given.items()} if given else {}), **mine}
-            else:
-                result[group] = [mine.get(name, value) for name, value in zip(names, given, strict=True)]
-        return result
+    found = Fit.of(problem, minimum(problem, max_steps))
+    if not found.success:
+        warnings.warn(f"{module.name}: the fit found no minimum: {found.message}", SimulationWarning, stacklevel=2)
+    return found
 
 
 def _problem(module: Module, experiments: list[Measured], parameters: Any, initial: Any, bounds: Any, priors: Any, noise: Any,
-             start: Any, rtol: float, method: str) -> _Problem:
+             start: Any, rtol: float, method: str) -> Problem:
     """What is fitted, checked. Raises ArgumentError with all faults."""
     faults: list[str] = []
     metadata = module.metadata
@@ -249,7 +122,7 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
     scale = np.array([abs(u.guess) if u.guess else 1.0 for u in unknowns])
     held = [(i, *known[u.name]) for i, u in enumerate(unknowns) if u.name in known]
     values = {u.name: u.guess for u in unknowns if u.experiment is None}
-    problem = _Problem(module, experiments, unknowns, scale, least, most, held, deviations, noise is not None, rtol, method,
+    problem = Problem(module, experiments, unknowns, scale, least, most, held, deviations, noise is not None, rtol, method,
                        [_on_constraints(module, e, values, states) for e in experiments])
     if problem.n < len(unknowns):
         raise ArgumentError(f"{module.name}: {len(unknowns)} unknowns are fitted to {problem.n} values; measure more, or fit "
