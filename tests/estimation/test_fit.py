@@ -13,6 +13,7 @@ import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.estimation.experiment import taken
 from symdyn.estimation.fit import _problem
+from symdyn.pictures.fits import _title
 from symdyn.runtime.building.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -133,6 +134,20 @@ def test_picture(tmp_path: Path) -> None:
     found = sd.fit(damped(), [measured(1), measured(2)], ["d", "m"])
     figure = found.plot(tmp_path / "fit.png")
     assert (tmp_path / "fit.png").stat().st_size > 10_000 and len(figure.axes) == 4
+
+
+def test_titles_and_labels_of_pictures_have_room() -> None:
+    truth, rng = damped().simulate(T, params=TRUTH), np.random.default_rng(0)
+    values = {"q": truth.q[:, 0] + 0.01 * rng.normal(size=len(T)), "tip": truth.outputs["tip"] + 0.01 * rng.normal(size=(201, 2))}
+    found = sd.fit(damped(), [sd.Experiment(T, values)] * 3, ["d", "m"], ["q", "q_dot"], noise=0.01)
+    figure = found.plot()
+    figure.canvas.draw()
+    title = figure.texts[0].get_window_extent()
+    assert title.x0 > 0 and title.x1 < figure.bbox.x1 and title.y1 < figure.bbox.y1 and len(figure.axes) == 12
+    boxes = [axes.yaxis.label.get_window_extent() for axes in figure.axes]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    assert figure.texts[0].get_text().replace("\n", " ") == f"damped: fit of {', '.join(found.values)}"
+    assert _title(found, 44) == "damped: fit of d, m, q(0) of experiment 1,\nq_dot(0) of experiment 1, 4 more"
 
 
 def test_faults_are_listed_together() -> None:
