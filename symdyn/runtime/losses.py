@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, UnsupportedExpression
+from symdyn.runtime.contradicted import contradiction, message
 from symdyn.runtime.raised import called
 from symdyn.shown import shown
 
@@ -114,8 +115,21 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
                                 f"{n_p} parameters") from None
         return result
 
+    def check(t: float, x: np.ndarray, by_x: np.ndarray, by_p: np.ndarray) -> None:
+        name = f"{module.name}: the function for {what} of the loss"
+        for by, at, row, value in (("the state", x, by_x, lambda changed: given(t, changed, p.copy())[0]),
+                                   ("the parameters", p, by_p, lambda changed: given(t, x.copy(), changed)[0])):
+            slopes = contradiction(value, at, row[None, :])
+            if slopes is not None:
+                raise ArgumentError(message(name, slopes, t, by))
+
+    checked: list[float] = []  # the time at which its derivatives were compared with differences, the first one
+
     def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
         rows = [one(float(tk), xk) for tk, xk in zip(t, x, strict=True)]
+        if not checked and rows:
+            checked.append(float(t[0]))
+            check(float(t[0]), x[0], rows[0][1], rows[0][2][:n_p])
         return _finite(module, what, t, Costs(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]),
                                               np.array([r[2][places] for r in rows]).reshape(len(rows), len(by))))
 

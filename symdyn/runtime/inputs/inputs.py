@@ -13,6 +13,7 @@ import numpy as np
 from symdyn.arguments import take
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, number, real
+from symdyn.runtime.contradicted import contradiction, message
 from symdyn.runtime.inputs.following import RATES, Followed, Motions, spline_pieces, take_motion
 from symdyn.runtime.inputs.sampled import Record, Sampled, Sampler
 from symdyn.runtime.inputs.tables import Pieces, Piecewise, Table, joined
@@ -119,8 +120,23 @@ class Inputs:
             except (TypeError, ValueError):
                 raise ArgumentError(f"{what} returned {shown(given)} at t = {t:.6g}; needed are {len(x)} numbers for each of its "
                                     "inputs") from None
+            if np.isfinite(x).all() and not np.isfinite(rows).all():
+                raise InputRaised(f"{what} is {rows[~np.isfinite(rows)][0]:g} at t = {t:.6g}", t, x)
             found[list(places)] = rows @ columns.T
         return found
+
+    def demand_true_slopes(self, t: float, x: np.ndarray) -> None:
+        """Raises ArgumentError where the gradient of a function contradicts it, or is not finite, at a time and state (n_x,)."""
+        for places, _, what in self.gradients:
+            try:
+                rows = self.slopes(t, x, np.eye(len(x)))[list(places)]
+            except InputRaised as error:
+                if error.__cause__ is not None:  # what a function raises ends the run
+                    return
+                raise ArgumentError(str(error)) from None
+            slopes = contradiction(lambda state, places=places: self.at(t, state)[list(places)], x, rows)  # type: ignore[misc]
+            if slopes is not None:
+                raise ArgumentError(message(what.removeprefix("the gradient of "), slopes, t, "the state"))
 
     @property
     def has_kinks(self) -> bool:

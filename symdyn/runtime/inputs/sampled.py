@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.arguments import OverTime
 from symdyn.errors import ArgumentError
-from symdyn.runtime.raised import called
+from symdyn.runtime.raised import InputRaised, called
 
 if TYPE_CHECKING:
     from symdyn.given import Row
@@ -98,6 +98,8 @@ class Sampler:
         except (TypeError, ValueError):
             raise ArgumentError(f"the gradient of {self.what} returned {given!r} at t = {t:.6g}; needed are {len(x)} numbers for "
                                 "each of its inputs") from None
+        if np.isfinite(x).all() and not np.isfinite(rows).all():
+            raise InputRaised(f"the gradient of {self.what} is {rows[~np.isfinite(rows)][0]:g} at t = {t:.6g}", t, x)
         return np.asarray(rows @ columns.T)
 
 

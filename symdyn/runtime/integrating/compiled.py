@@ -14,6 +14,7 @@ import numpy as np
 from symdyn.backend.c_records import fields_of
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
+from symdyn.functions.sensitivities import shown_name
 from symdyn.runtime.inputs.inputs import not_finite
 from symdyn.runtime.integrating.chatter import STEPS, chatter_of
 from symdyn.runtime.integrating.events import CHATTER, Happened, at_once, ended, not_known, not_proved, too_quick
@@ -337,7 +338,7 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
         return describe_stop(metadata, t_fail, x_fail, why)
     if status == STATUS.STATE_NOT_FINITE:
         bad = of.bad_index
-        name = metadata.x[bad] if 0 <= bad < run.n_x else "the state"
+        name = shown_name(metadata.x[bad]) if 0 <= bad < run.n_x else "the state"
         why = _inputs(module, run, t_fail, x_fail)
         return describe_stop(metadata, t_fail, x_fail, f"the derivative of {name} is not finite{why}")
     if status == STATUS.PROJECTION_FAILED:

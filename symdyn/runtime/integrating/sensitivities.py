@@ -111,6 +111,7 @@ class Asked:
                                 f"the user, whose derivatives are not known: {names}; pass sd.Smooth(function, gradient=...), a "
                                 "function of (t, x), write the law into the system's loads as expressions of coordinates and "
                                 "speeds, or make the inputs functions of the time alone")
+        request.inputs.demand_true_slopes(request.span[0], request.x0[:request.n_state])
 
         changed = [name for name in self.columns if name in module.metadata.parameters]
         held = ", ".join(holding(module, request.span[0], request.x0[:request.n_state], request.p, changed))
