@@ -8,6 +8,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
+from symdyn.runtime.integrating.contact_columns import Switch
 
 G = 9.81
 E, GRAVITY, MU, KINETIC, K = sd.parameters("e g mu kinetic k")
@@ -47,9 +48,24 @@ def test_ball_after_six_impacts(ball: Any) -> None:
         assert abs(found[name] - expected[0]) < 1e-11
 
 
-def test_ball_at_rest_after_infinitely_many_impacts_depends_on_nothing(ball: Any) -> None:
-    solution = ball.simulate((0, 6), q=[1.0], rtol=1e-12, sensitivities=["y(0)", "e", "g"])
+def test_ball_at_rest_after_infinitely_many_impacts_depends_on_nothing(ball: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.warns(SimulationWarning, match=r"ball: the impacts of floor accumulate at t = 4.06.* end the motion before it"):
+        solution = ball.simulate((0, 6), q=[1.0], rtol=1e-12, sensitivities=["y(0)", "e", "g"])
     assert len(solution.contacts["floor"].rests) == 1
+    # In closed form t1 (1 + e)/(1 - e) with the first fall t1.
+    assert np.sqrt(2 / G) * 1.8 / 0.2 == pytest.approx(4.0637, abs=1e-4)
+    asked: dict[str, Any] = {"by": ["e"], "t": (0, 6), "q": [1.0], "rtol": 1e-12, "events": False}
+    with pytest.warns(SimulationWarning, match=r"ball: the impacts of floor accumulate at t = 4.06"):
+        assert abs(ball.gradient(sd.Loss(end=sp.Symbol("y")), **asked)["e"]) < 1e-9
+
+    def fails(*given: object) -> None:
+        raise EvaluationError("floor_closes has no derivative there")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Switch, "along", fails)
+        with pytest.warns(SimulationWarning), pytest.raises(EvaluationError, match=(
+                r"ball: floor_closes has no derivative there; impacts accumulate near t = 4.06")):
+            ball.gradient(sd.Loss(end=sp.Symbol("y")), **asked)
     assert max(np.abs(solution.sensitivity[name][-1]).max() for name in ("y(0)", "e", "g")) < 1e-9
 
 

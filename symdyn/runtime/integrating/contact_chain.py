@@ -15,7 +15,7 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.runtime.contact_laws import SLIDING, STICKING
 from symdyn.runtime.integrating.contact_columns import Switch
-from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
 from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.way_back import Feedback, Way
 
@@ -35,6 +35,7 @@ class ContactChain:
         self.switches, self.room = switches, room
         self.end, self.rows = (float(outcome.t[-1]), outcome.x[-1]), (outcome.t, outcome.x)
         self.n_steps, self.memory = outcome.n_steps, outcome.t.nbytes + outcome.x.nbytes
+        self.accumulated = accumulations(outcome, [record.name for record in module.metadata.contacts])
         self._check(outcome)
 
     def forth(self, integral: Integral | None = None) -> tuple[float, np.ndarray]:
@@ -63,7 +64,10 @@ class ContactChain:
         followed = set(Feedback(self.module, self.request.inputs, ()).names)
         names = ["" if name in followed else name for name in self.carried]
         x = np.vstack([np.eye(n_x), np.zeros((len(names), n_x))])
-        later, after = switch.along(switch.moves(x, [*[""] * n_x, *names]))
+        try:
+            later, after = switch.along(switch.moves(x, [*[""] * n_x, *names]))
+        except EvaluationError as error:
+            raise EvaluationError(f"{self.module.name}: {error}{self._gathered(switch.t)}") from None
         row = after @ weights[:n_x]
         if integral is not None and later.any():
             t, states = np.full(2, switch.t), np.vstack([switch.before, switch.after])
@@ -71,6 +75,11 @@ class ContactChain:
             row += later * (before - beyond)
         weights[:n_x] = row[:n_x]
         weights[n_x:] += row[n_x:]
+
+    def _gathered(self, t: float) -> str:
+        """What to add of impacts that accumulate near a time."""
+        near = [begin for _, begin, end in self.accumulated if begin <= t <= end]
+        return f"; impacts accumulate near t = {near[0]:.6g} s: end the motion before them" if near else ""
 
     def _check(self, outcome: Outcome) -> None:
         metadata = self.module.metadata

@@ -26,7 +26,7 @@ from symdyn.runtime.integrating.events import not_seen
 from symdyn.runtime.integrating.methods import DEFAULT, check_compiled
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.quadrature import Integral
-from symdyn.runtime.integrating.sensitivities import Asked, unseen_jumps
+from symdyn.runtime.integrating.sensitivities import Asked, gathered, unseen_jumps
 from symdyn.runtime.integrating.simulate import (
     checked_positive,
     checked_times,
@@ -161,7 +161,8 @@ def _checked_run(module: Module, request: Request, method: str, switches: list[S
         raise EvaluationError(outcome.message)
     unseen = not_seen(module, request.look, request.inputs.by_function(module.metadata.inputs), request.event_spacing)
     recorded = replace(request, inputs=request.inputs.recorded(outcome.record))
-    for doubt in (*outcome.doubts, *filter(None, [unseen]), *unseen_jumps(module, recorded, outcome)):
+    for doubt in (*outcome.doubts, *filter(None, [unseen]), *gathered(module, outcome),
+                  *unseen_jumps(module, recorded, outcome)):
         warnings.warn(doubt, SimulationWarning, stacklevel=6)
     return outcome
 

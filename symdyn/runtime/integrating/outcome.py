@@ -174,3 +174,8 @@ def of_pieces(done: Sequence[Outcome], t: np.ndarray, x: np.ndarray, n_steps: in
                                 sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
         n_jacobians=sum(o.n_jacobians for o in done), n_factorizations=sum(o.n_factorizations for o in done),
         doubts=next((o.doubts for o in done if o.doubts), ()), cause=cause or last.cause)
+
+
+def accumulations(outcome: Outcome, names: Sequence[str]) -> list[tuple[str, float, float]]:
+    """Where impacts accumulated: the contact, by names of all, the last impact, and when its flights come to their end."""
+    return [(names[k], one.t, end) for one in outcome.impacts for k, end in one.rest.items() if end > one.t]

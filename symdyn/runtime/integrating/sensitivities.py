@@ -15,7 +15,7 @@ from symdyn.real_numbers import real_of
 from symdyn.runtime.constraints import holding
 from symdyn.runtime.integrating.at_kinks import staying
 from symdyn.runtime.integrating.methods import COMPILED
-from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -126,8 +126,8 @@ class Asked:
         if not self.names:
             return []
         x = outcome.x[:, :module.metadata.sizes.x]
-        return [*self._without_effect(module, request, outcome), *unseen_jumps(module, request, outcome),
-                *staying(module, request, outcome.t, x)]
+        return [*self._without_effect(module, request, outcome), *gathered(module, outcome),
+                *unseen_jumps(module, request, outcome), *staying(module, request, outcome.t, x)]
 
     def _without_effect(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
         n_x = module.metadata.sizes.x
@@ -170,6 +170,14 @@ def _depend_on_state(request: Request) -> set[int]:
     here = request.inputs.at(t, x)
     sides = [request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x))) for way in (-1.0, 1.0)]
     return set(np.flatnonzero((here != sides[0]) | (here != sides[1])).tolist())
+
+
+def gathered(module: Module, outcome: Outcome) -> list[str]:
+    """What to warn of where impacts accumulate."""
+    return [f"{module.name}: the impacts of {name} accumulate at t = {end:.6g} s, and what is left of them from t = {begin:.6g} "
+            "s on, within the tolerances of the motion, is left out: derivatives after it lose digits, those by a restitution "
+            "most of all; end the motion before it, or compare with differences"
+            for name, begin, end in accumulations(outcome, [one.name for one in module.metadata.contacts])]
 
 
 def unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:
