@@ -20,6 +20,8 @@ from symdyn.functions.table import BATCH
 from symdyn.functions.tapes import all_columns_of
 from symdyn.runtime.building.library import Unit
 from symdyn.runtime.building.texts import Texts
+from symdyn.tape.jumps import breaks
+from symdyn.tape.tape import Tape
 
 
 class Libraries:
@@ -74,6 +76,13 @@ class Libraries:
         """Where a matrix of derivatives may differ from zero; None for other functions and for what has no columns."""
         columns = all_columns_of(self.equations, name, RightSide())
         return None if columns is None else columns.structure().reshape(*columns.shape, columns.n)
+
+    @cached_property
+    def breaks(self) -> Tape | None:
+        """What passes zero where the right-hand side has a kink or a jump, as `surfaces`; None where it has none."""
+        recorder = self.equations.recorder
+        found = breaks(recorder, self.equations.quantity("rhs").tolist())
+        return Tape.of(recorder, surfaces=np.array(found, dtype=object)) if found else None
 
     def base_names(self) -> tuple[str, ...]:
         """Names of the base parameters of the mechanism."""

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from symdyn.statics.locus import RootLocus
     from symdyn.statics.periodic import PeriodicMotion
     from symdyn.statics.stability import Stability
+    from symdyn.tape.tape import Tape
 
     # A number; a table over time, as a pair of times and values or as Table; a function of (t, x); a controller whose values are
     # held.
@@ -539,6 +540,16 @@ class Module:
                                 "derivatives is unknown; compile equations")
         found = self.structure(name)
         return found if found is not None else np.zeros(self.shape(name), dtype=bool)
+
+    def breaks(self) -> Tape | None:
+        """What passes zero where the right-hand side has a kink or a jump, a tape with the output `surfaces`; None where it has
+        none, or where the module was put together without equations.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").breaks() is None
+        True
+        """
+        found: Tape | None = getattr(self._provider, "breaks", None) if self.metadata.not_smooth else None
+        return found
 
     def structure(self, name: str) -> np.ndarray | None:
         """Where a function that is a matrix of derivatives, such as hessian_x, may differ from zero; None where that is unknown.

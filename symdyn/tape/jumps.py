@@ -14,6 +14,7 @@ from symdyn.tape.tape import Output, reachable
 
 _MOVING = TIME | COORDINATE | SPEED | STATE | INPUT
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_BENT = ("abs", "min", "max")
 _ROUNDED = {"floor": Fraction(1, 2), "ceil": Fraction(1, 2)}
 # Expressions with more operations than this are named by where they stand alone.
 _SHORT, _LETTERS = 60, 100
@@ -55,6 +56,16 @@ def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
             if surface not in found and opposite not in found:
                 found[surface] = Jump(surface, node, smooth)
     return list(found.values())
+
+
+def breaks(recorder: Recorder, entries: Sequence[Any]) -> list[Any]:
+    """What passes zero along a motion where these entries have a kink or a jump, each surface once."""
+    found: dict[Any, None] = {}
+    for node in reachable(entries):
+        if node.mask & _MOVING and node.op in _BENT:
+            found[node.args[0] if node.op == "abs" else recorder.sub(*node.args)] = None
+    found |= dict.fromkeys(jump.surface for jump in jumps(recorder, entries))
+    return [surface for surface in found if isinstance(surface, Node)]
 
 
 def _direction(denominator: Any) -> Any:

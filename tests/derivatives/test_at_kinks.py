@@ -12,6 +12,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import SimulationWarning
+from symdyn.runtime.integrating import at_breaks
 from symdyn.runtime.module import Module
 
 x, v = sp.symbols("x x_dot")
@@ -69,3 +70,36 @@ def test_what_has_derivatives() -> None:
         assert found["x(0)"] == pytest.approx(sol.sensitivity["x(0)"][-1, 0], rel=2e-4)
         slider("-k*x*Abs(x)").simulate((0, 1), q=[0.0], sensitivities=["x(0)"])
         slider("-k*x").gradient(sd.Loss(integral=x**2, end=x**2), ["x(0)"], (0, 1), q=[0.0])
+
+
+@pytest.mark.parametrize("method", ["dop853", "bs54"])
+@pytest.mark.parametrize("law", ["max", "pieces"])
+def test_gradient_across_a_stop_against_its_closed_form(law: str, method: str) -> None:
+    """A free mass runs against a spring at p and comes back: x = 2 p - v T + v pi/sqrt(k) at T."""
+    x = sd.coordinates("x")
+    k, p = sd.parameters("k p")
+    system = sd.System("stop")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x))
+    force = {"max": sp.Max(x - p, 0), "pieces": sp.Piecewise((x - p, x > p), (0, True))}[law]
+    system.add_joint_force(slide, -k * force)
+    system.defaults = {k: 30, p: 0.7}
+    module, end, v = system.compile(), 3.0, 1.2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SimulationWarning)
+        found = module.gradient(sd.Loss(end=x), ["p", "k", "x(0)", "x_dot(0)"], (0, end), [0], [v], rtol=1e-9, method=method)
+    assert found.value == pytest.approx(1.4 - v * end + v * np.pi / np.sqrt(30), abs=3e-8)
+    expected = [2, -v * np.pi / 2 / 30**1.5, -1, -end + np.pi / np.sqrt(30)]
+    np.testing.assert_allclose(found.array, expected, atol=1e-6)
+
+
+def test_too_many_kinks_are_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(at_breaks, "WORK", 5)
+    x = sd.coordinates("x")
+    system = sd.System("rectified")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_joint_force(slide, -4 * x + abs(sp.sin(5 * sd.t)))
+    message = r"rectified: the motion passes kinks of the equations too often .*: at \d+ of them, the first near t = 0.* add events"
+    with pytest.warns(SimulationWarning, match=message):
+        system.compile().gradient(sd.Loss(end=x), ["x(0)"], (0, 3))

@@ -18,6 +18,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.at_breaks import Breaks
 from symdyn.runtime.integrating.carried_on import CarriedOn
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.quadrature import Integral
@@ -287,7 +288,8 @@ class Chain:
     """A motion in pieces, forth and back; room: bytes up to which steps are kept."""
 
     def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], outcome: Outcome,
-                 room: float) -> None:
+                 room: float, breaks: Breaks | None = None) -> None:
+        self.breaks = breaks
         self.module, self.method, self.outcome, self.room = module, method, outcome, room
         self.request = replace(request, look=None)
         self.cuts = moments(module, outcome, request)
@@ -341,7 +343,7 @@ class Chain:
     def _piece(self, t: float, x: np.ndarray, until: float) -> Way:
         first = self.request.first_step if not self.pieces else 0.0
         request = replace(self.request, span=(t, until), x0=x, first_step=first, inputs=self._inputs(t))
-        return Way(self.module, request, self.method, self.carried, self.room)
+        return Way(self.module, request, self.method, self.carried, self.room, self.breaks)
 
     def _inputs(self, t: float) -> Inputs:
         """The inputs from a time on to the next cut."""

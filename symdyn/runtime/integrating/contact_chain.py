@@ -14,6 +14,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.runtime.contact_laws import SLIDING, STICKING
+from symdyn.runtime.integrating.at_breaks import Breaks
 from symdyn.runtime.integrating.contact_columns import Switch
 from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
 from symdyn.runtime.integrating.quadrature import Integral
@@ -30,7 +31,8 @@ class ContactChain:
     """
 
     def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], outcome: Outcome,
-                 switches: Sequence[Switch], room: float) -> None:
+                 switches: Sequence[Switch], room: float, breaks: Breaks | None = None) -> None:
+        self.breaks = breaks
         self.module, self.request, self.method, self.carried = module, replace(request, look=None), method, tuple(carried)
         self.switches, self.room = switches, room
         self.end, self.rows = (float(outcome.t[-1]), outcome.x[-1]), (outcome.t, outcome.x)
@@ -50,7 +52,7 @@ class ContactChain:
         for switch in reversed(self.switches):
             if until > switch.t:
                 part = replace(self.request, span=(switch.t, until), x0=switch.after, p=switch.p_after, times=None)
-                way = Way(self.module, part, self.method, self.carried, self.room)
+                way = Way(self.module, part, self.method, self.carried, self.room, self.breaks)
                 way.forth()
                 value += way.back(integral, weights)
                 self.memory = max(self.memory, way.memory)

@@ -18,6 +18,7 @@ from symdyn.runtime.consistent import check_start
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.across import Chain
+from symdyn.runtime.integrating.at_breaks import Breaks
 from symdyn.runtime.integrating.at_kinks import ending, staying
 from symdyn.runtime.integrating.contact_chain import ContactChain
 from symdyn.runtime.integrating.contact_columns import Switch
@@ -113,7 +114,8 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     asked.check(module, request, method, False)
     followed = Feedback(module, free, ()).names
     carried = tuple(dict.fromkeys([*[name for name in asked.columns if name], *followed]))
-    way = _way(module, request, method, carried)
+    breaks = Breaks.of(module, span)
+    way = _way(module, request, method, carried, breaks)
     names = way.carried
     integral, end = (None if given is None else cost_of(module, what, given, names, p)
                      for what, given in (("the integral", loss.integral), ("the end", loss.end)))
@@ -133,7 +135,7 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
         value += way.back(measured, weights)
     if not np.isfinite(value):
         raise EvaluationError(f"{module.name}: the loss is {value:g}")
-    for doubt in (*([] if measured is None else measured.doubts()),
+    for doubt in (*([] if measured is None else measured.doubts()), *([] if breaks is None else breaks.doubts()),
                   *staying(module, request, np.array([span[0], t]), np.array([start, x]), integral),
                   *([] if end is None else ending(module, request, t, x, end))):
         warnings.warn(doubt, SimulationWarning, stacklevel=3)
@@ -141,15 +143,17 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
                     clock.perf_counter() - begun)
 
 
-def _way(module: Module, request: Request, method: str, carried: Sequence[str]) -> Way | Chain | ContactChain:
+def _way(module: Module, request: Request, method: str, carried: Sequence[str],
+         breaks: Breaks | None) -> Way | Chain | ContactChain:
     """What goes forth and back; in pieces where events are looked for, controllers hold inputs, or contacts switch."""
     if module.metadata.contacts:
         switches: list[Switch] = []
-        return ContactChain(module, request, method, carried, _checked_run(module, request, method, switches), switches, KEPT)
+        return ContactChain(module, request, method, carried, _checked_run(module, request, method, switches), switches,
+                            KEPT, breaks)
     looked = request.look is not None and request.look.any()
     if not looked and not request.inputs.samplers and not module.metadata.switches:
-        return Way(module, request, method, carried, KEPT)
-    return Chain(module, request, method, carried, _checked_run(module, request, method), KEPT)
+        return Way(module, request, method, carried, KEPT, breaks)
+    return Chain(module, request, method, carried, _checked_run(module, request, method), KEPT, breaks)
 
 
 def _checked_run(module: Module, request: Request, method: str, switches: list[Switch] | None = None) -> Outcome:

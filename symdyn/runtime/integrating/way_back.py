@@ -20,6 +20,7 @@ from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.at_breaks import Breaks
 from symdyn.runtime.integrating.compiled import Run, moved_far, stopped_because
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.runtime.integrating.quadrature import Integral
@@ -87,13 +88,14 @@ class _Steps:
 class Way:
     """A run forth and back, across no event.
 
-    room    bytes up to which steps are kept; outer: length of the step of a longer run that it divides
+    room     bytes up to which steps are kept; outer: length of the step of a longer run that it divides
+    breaks   where the equations have kinks; None: nowhere that is known
     """
 
     def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], room: float,
-                 outer: float = 0.0) -> None:
+                 breaks: Breaks | None = None, outer: float = 0.0) -> None:
         self.module, self.request, self.carried, self.room = module, request, tuple(carried), room
-        self.method, self.outer = method, outer
+        self.method, self.breaks, self.outer = method, breaks, outer
         self.feedback = Feedback(module, request.inputs, self.carried)
         unit: Any = module.unit(RightSide(method=method, adjoint=tuple(carried)))
         self.unit, self.run = unit, Run(unit, request)
@@ -207,16 +209,21 @@ class Way:
         n = steps.n
         self.unit.function("simulation_stages")(
             ctypes.c_long(n), *_pointers(self.A, self.c, steps.t, steps.h, steps.x, steps.slopes, times, states))
-        if integral is None or not n:
+        if not n or (integral is None and self.breaks is None):
             self._over(steps, 0, n, times, states, None, weights)
             return 0.0
         h, at, rows = steps.h[:n], times[:n].ravel(), states[:n].reshape(-1, self.n_x)
         inputs = self._inputs(at, rows)
-        costs = integral(at, rows, inputs)
-        if not integral.weighed:
-            integral.over_stages(h, rows, costs)
-        bad, jumping = integral.judge(h, at, rows, inputs, costs, self.outer)
-        parts = h * (costs.values.reshape(n, self.stages) @ self.b)
+        costs, parts, bad, jumping = None, np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        if integral is not None:
+            costs = integral(at, rows, inputs)
+            if not integral.weighed:
+                integral.over_stages(h, rows, costs)
+            bad, jumping = integral.judge(h, at, rows, inputs, costs, self.outer)
+            parts = h * (costs.values.reshape(n, self.stages) @ self.b)
+        if self.breaks is not None:
+            bent = self.breaks.crossed(h, at, rows, self.request.p, inputs)
+            bad, jumping = bad | bent, jumping & ~bent
         if not (bad.any() or jumping.any()):
             self._over(steps, 0, n, times, states, costs, weights)
             return float(parts.sum())
@@ -230,7 +237,7 @@ class Way:
             else:
                 self._over(steps, begin, end, times, states, costs, weights)
                 value += float(parts[begin:end].sum())
-            if jumping[end - 1]:
+            if jumping[end - 1] and integral is not None and costs is not None:
                 here = slice(begin * self.stages, end * self.stages)
                 gained = integral.across(at[here], rows[here], inputs[here], costs.values[here], steps.slopes[begin, 0])
                 if len(gained):
@@ -262,14 +269,18 @@ class Way:
                                   f"{self.unit.reason(int(reason))}")
         self._note(steps, sum(a.nbytes for a in (times, states, of_x, of_others, feedback) if a is not None))
 
-    def _finer(self, steps: _Steps, begin: int, end: int, integral: Integral, weights: np.ndarray) -> float:
-        """The same over shorter steps in place of some, where the integrand of a loss needs them; their part of the integral."""
+    def _finer(self, steps: _Steps, begin: int, end: int, integral: Integral | None, weights: np.ndarray) -> float:
+        """The same over shorter steps in place of some, where the integrand of a loss or a kink of the equations needs them;
+        their part of the integral."""
         length = float(np.abs(steps.h[begin:end]).min()) / PARTS
         part = replace(self.request, span=(float(steps.t[begin]), float(steps.t[end - 1] + steps.h[end - 1])),
                        x0=steps.x[begin].copy(), first_step=length, max_step=length, times=None)
-        way = Way(self.module, part, self.method, self.carried, self.room, self.outer or float(steps.h[begin:end].min()))
+        way = Way(self.module, part, self.method, self.carried, self.room, self.breaks,
+                  self.outer or float(steps.h[begin:end].min()))
         way.forth()
-        integral.work -= PARTS + way.n_steps
+        for counted in (integral, self.breaks):
+            if counted is not None:
+                counted.work -= PARTS + way.n_steps
         value = way.back(integral, weights)
         self._note(steps, way.memory)
         return value
