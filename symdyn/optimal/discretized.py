@@ -381,8 +381,7 @@ class Discretized:
         mesh, motion = self.mesh, self.motion(z)
         x, u = self.polynomials(motion)
         rate = lambda shares: motion.T * self._integrand(motion, shares, x(shares), u(shares))
-        pieces, sizes = integrals(rate, x.x, EXACT)
-        by_interval = pieces.reshape(mesh.n_intervals, -1).sum(axis=1)
+        by_interval, sizes = integrals(rate, mesh.breaks, EXACT)
         end = self._end_cost(motion)
         size = float(sizes.sum()) + abs(end)
         quadrature = mesh.B @ self.flow().values(self._arguments(motion))[:, -1]

@@ -12,12 +12,15 @@ from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
 from symdyn.optimal.outputs import WithOutputs
 from symdyn.runtime.losses import cost_of
+from symdyn.runtime.raised import InputRaised
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 # Of differences of derivatives, relative to 1 and the argument: a third of the digits is best for central ones.
 STEP = float(np.finfo(float).eps) ** (1 / 3)
+# What a function may raise beyond where it is defined: steps that lead there are not taken.
+OF_NUMBERS = (ArithmeticError, ValueError)
 
 
 class WithFunctions:
@@ -25,6 +28,8 @@ class WithFunctions:
 
     functions   of the user, see sd.Loss; what: as messages call them
     first       where [x; inputs; free parameters; t] begin among the arguments; p (n_p,): values of all parameters
+
+    raised      the first EvaluationError where a function was not defined
 
     First derivatives are those that the functions give, second ones central differences of these: they say how a solver goes on,
     and not where it ends.
@@ -36,6 +41,7 @@ class WithFunctions:
         self.of, self.p, self.first, self.m = of, p.copy(), first, 1
         self._x = np.arange(of.n_x) + first
         self._by = np.concatenate([self._x, first + of.n_x + of.n_in + np.arange(len(of.free))])
+        self.raised: EvaluationError | None = None
         self._names = [module.metadata.parameters[k] for k in of.free]
         self.slopes, self.curvature = expression.slopes.copy(), expression.curvature.copy()
         self.slopes[:, self._by] = True
@@ -74,7 +80,7 @@ class WithFunctions:
 
     def _of_functions(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (N,) of all functions and their derivatives (N, n) by the state and free parameters; NaN where they are not
-        finite."""
+        finite. What is no matter of numbers, such as a name that is not there, is raised."""
         value, slopes = np.zeros(len(at)), np.zeros((len(at), len(self._by)))
         inputs = np.zeros((1, self.of.n_in))
         for k, row in enumerate(at):
@@ -86,7 +92,10 @@ class WithFunctions:
             for function in self.functions:
                 try:
                     found = cost_of(self.module, self.what, function, self._names, p)(row[-1:], row[None, self._x], inputs)
-                except EvaluationError:
+                except EvaluationError as error:
+                    if isinstance(error, InputRaised) and not isinstance(error.__cause__, OF_NUMBERS):
+                        raise
+                    self.raised = self.raised or error
                     value[k], slopes[k] = np.nan, np.nan
                     break
                 value[k] += found.values[0]

@@ -63,7 +63,10 @@ def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int,
             raise
         raise ArgumentError(f"optimize: IPOPT does not take options {dict(options)}: "
                             f"{str(error).strip().splitlines()[-1]}") from None
+    raised: list[Exception] = calls["raised"]
     found = solver(x0=z, lbx=program.z_least, ubx=program.z_most, lbg=program.g_least, ubg=program.g_most)
+    if raised:
+        raise raised[0]
     stats = solver.stats()
     return Found(np.array(found["x"]).ravel(), float(found["f"]), np.array(found["lam_g"]).ravel(),
                  np.array(found["lam_x"]).ravel(), int(stats["iter_count"]), stats["return_status"] in SOLVED,
@@ -71,11 +74,12 @@ def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int,
 
 
 def _callbacks(ca: Any, program: Program) -> dict[str, Any]:
-    """Functions as CasADi calls them: of x, p and, of the Hessian, the multipliers of f and g."""
+    """Functions as CasADi calls them: of x, p and, of the Hessian, the multipliers of f and g; "raised": what they raised."""
     n, m = program.n, program.m
     dense = ca.Sparsity.dense
     jacobian = ca.Sparsity.triplet(m, n, program.jacobian_rows.tolist(), program.jacobian_columns.tolist())
     hessian = ca.Sparsity.triplet(n, n, program.hessian_rows.tolist(), program.hessian_columns.tolist())
+    raised = list[Exception]()  # exceptions do not pass CasADi
     two, four = [dense(n, 1), dense(0, 0)], [dense(n, 1), dense(0, 0), dense(1, 1), dense(m, 1)]
 
     class Compiled(ca.Callback):  # type: ignore[misc]
@@ -110,14 +114,25 @@ def _callbacks(ca: Any, program: Program) -> dict[str, Any]:
             given = [np.frombuffer(a, dtype=float) if a is not None else np.zeros(0) for a in arg]
             for buffer, value in zip(res, self.called(*given), strict=True):
                 if buffer is not None:
-                    np.frombuffer(buffer, dtype=float)[:] = value()
+                    np.frombuffer(buffer, dtype=float)[:] = self.evaluated(value)
             return 0
+
+        def evaluated(self, value: Callable[[], Any]) -> Any:
+            """Not a number from the first exception on."""
+            if raised:
+                return np.nan
+            try:
+                return value()
+            except Exception as error:  # raised again after the solver
+                raised.append(error)
+                return np.nan
 
     def of(*functions: Callable[[np.ndarray], Any]) -> Callable[..., tuple[Any, ...]]:
         return lambda x, p: tuple((lambda f=f: f(x)) for f in functions)  # type: ignore[misc]
 
     xp, lagrangian = ["x", "p"], ["x", "p", "lam_f", "lam_g"]
     return {
+        "raised": raised,
         "nlp": Compiled("nlp", two, [dense(1, 1), dense(m, 1)], (xp, ["f", "g"]), of(program.f, program.g)),
         "grad_f": Compiled("nlp_grad_f", two, [dense(1, 1), dense(n, 1)], (xp, ["f", "grad_f_x"]),
                            of(program.f, program.gradient)),

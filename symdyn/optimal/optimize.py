@@ -15,6 +15,7 @@ from scipy.interpolate import PPoly
 from symdyn.errors import ArgumentError, EvaluationError, NoOptimum, OptimumWarning, SymdynError
 from symdyn.optimal import ipopt, scipy_solvers
 from symdyn.optimal.discretized import Discretized, Motion
+from symdyn.optimal.functions import WithFunctions
 from symdyn.optimal.ipopt import Found
 from symdyn.optimal.loops import on_constraints, unit_groups
 from symdyn.optimal.problem import Faults, Problem, problem_of
@@ -22,6 +23,7 @@ from symdyn.optimal.result import MeshRecord, Optimum
 from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
 from symdyn.real_numbers import NotReal, real
 from symdyn.runtime.module import demand_module
+from symdyn.runtime.raised import InputRaised
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -456,8 +458,13 @@ class _Search:
         """Raises EvaluationError where cost or constraints are not finite at the guess."""
         owner, program = self.problem.module.name, made.program
         if not np.isfinite(program.f(made.z)) or not np.isfinite(program.gradient(made.z)).all():
-            raise EvaluationError(f"{owner}: the cost, or its derivative, is not finite at the guess: {program.f(made.z):g}; "
-                                  "pass another guess, or bounds where it is finite")
+            raised = [cost.raised for cost in (self.problem.integrand, self.problem.end_cost)
+                      if isinstance(cost, WithFunctions) and cost.raised is not None]
+            if raised and isinstance(raised[0], InputRaised):
+                raise raised[0]
+            what = str(raised[0]).removeprefix(f"{owner}: ") if raised else f"{program.f(made.z):g}"
+            raise EvaluationError(f"{owner}: the cost, or its derivative, is not finite at the guess: {what}; pass another guess, "
+                                  "or bounds where it is finite")
         wrong = np.flatnonzero(~np.isfinite(program.g(made.z)))
         if len(wrong):
             raise EvaluationError(f"{owner}: {made.text(program, int(wrong[0]))} cannot be evaluated at the guess; pass another "

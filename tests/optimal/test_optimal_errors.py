@@ -149,6 +149,33 @@ def test_costs_and_rates_that_are_not_finite() -> None:
     assert found.success
 
 
+@pytest.mark.parametrize("method", ["ipopt", "slsqp"])
+def test_exceptions_of_cost_functions(slider: Module, method: str) -> None:
+    """Those of the guess and later ones are what they are, with their cause and line."""
+    def misspelled(t: float, x: np.ndarray, p: np.ndarray) -> Any:
+        return xx[0] ** 2, x  # type: ignore[name-defined]  # noqa: F821
+
+    def misspelled_beyond(t: float, x: np.ndarray, p: np.ndarray) -> Any:
+        return ((x[0] - 3) ** 2 if x[0] < 0.5 else xx), np.array([2 * (x[0] - 3), 0])  # type: ignore[name-defined]  # noqa: F821
+
+    def short_beyond(t: float, x: np.ndarray, p: np.ndarray) -> Any:
+        return ((x[0] - 3) ** 2, np.array([2 * (x[0] - 3), 0])) if x[0] < 0.5 else 1.0
+
+    small: dict[str, Any] = {"method": method, "tolerance": None, "intervals": 3}
+    for one, cause, text in ((misspelled, NameError, r"integral of the cost of the loss \(misspelled\) raised NameError: name "
+                              r"'xx' is not defined, in line \d+ of test_optimal_errors.py"),
+                             (lambda t, x: 0, TypeError, r"raised TypeError: .*takes 2 positional arguments but 3 were given"),
+                             (lambda t, x, p: 1 / 0, ZeroDivisionError, r"raised ZeroDivisionError: division by zero, in line")):
+        with pytest.raises(sd.EvaluationError, match=text) as error:
+            sd.optimize(slider, sd.Loss(integral=one), 1.0, **small)
+        assert isinstance(error.value.__cause__, cause)
+    with pytest.raises(sd.EvaluationError, match=r"end of the cost of the loss \(misspelled_beyond\) raised NameError") as error:
+        sd.optimize(slider, [EFFORT, sd.Loss(end=misspelled_beyond)], 1.0, **small)
+    assert isinstance(error.value.__cause__, NameError)
+    with pytest.raises(sd.ArgumentError, match=r"the function for the end of the cost of the loss returned 1.0 at t = 1; needed"):
+        sd.optimize(slider, [EFFORT, sd.Loss(end=short_beyond)], 1.0, **small)
+
+
 def test_mesh_that_is_not_fine_enough(slider: Module) -> None:
     text = r"the error of an interval, of the integral of the cost, is .* after 1 meshes, above the tolerance 1e-08"
     with pytest.warns(sd.OptimumWarning, match=text):

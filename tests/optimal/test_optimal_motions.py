@@ -231,7 +231,8 @@ def test_costs_by_functions(options: dict[str, Any]) -> None:
 
 
 def test_functions_that_are_not_finite() -> None:
-    with pytest.raises(sd.EvaluationError, match=r"the cost, or its derivative, is not finite at the guess"):
+    text = r"or its derivative, is not finite at the guess: the end of the cost of the loss is inf at t = 2 s; pass another guess"
+    with pytest.raises(sd.EvaluationError, match=text):
         sd.optimize(slider(), sd.Loss(end=lambda t, x, p: (np.inf, x)), 2.0)
     # Steps that lead to where it is not are not taken.
     barrier = sd.Loss(end=lambda t, x, p: (-np.log(1.5 - x[0]) if x[0] < 1.5 else np.nan, np.array([1 / (1.5 - x[0]), 0.0])))
