@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
 from symdyn.optimal.outputs import WithOutputs
@@ -19,8 +19,21 @@ if TYPE_CHECKING:
 
 # Of differences of derivatives, relative to 1 and the argument: a third of the digits is best for central ones.
 STEP = float(np.finfo(float).eps) ** (1 / 3)
+# Steps of differences of values, likewise, and what derivatives may differ from them by, relative.
+DIFFERENCES, NEAR = (1e-4, 1e-5), 1e-4
 # What a function may raise beyond where it is defined: steps that lead there are not taken.
 OF_NUMBERS = (ArithmeticError, ValueError)
+
+
+class _Differences(NamedTuple):
+    """Central differences of values, those to either side, how uncertain the first are, the largest value, the step."""
+
+    central: float
+    before: float
+    after: float
+    uncertain: float
+    size: float
+    h: float
 
 
 class WithFunctions:
@@ -78,26 +91,65 @@ class WithFunctions:
                 return True
         return False
 
+    def demand_derivatives(self, at: np.ndarray) -> None:
+        """Raises ArgumentError where a derivative that a function gives is none of its values, at rows of arguments: central
+        differences and those to either side, one of which may go over a kink."""
+        names = (*self.module.metadata.x, *self._names)
+        for function in self.functions:
+            for row in at:
+                here = self._one(function, row)
+                for name, column, given in zip(names, self._by, () if here is None else here[1], strict=here is not None):
+                    found = self._differences(function, row, column)
+                    if found is None:
+                        continue
+                    rounding = 1e3 * np.finfo(float).eps * found.size / found.h
+                    allowed = 10 * found.uncertain + rounding + NEAR * max(abs(given), abs(found.central))
+                    if min(abs(given - d) for d in (found.central, found.before, found.after)) > allowed:
+                        called = getattr(function, "__name__", "<lambda>")
+                        which = "" if called == "<lambda>" else f" ({called})"
+                        raise ArgumentError(f"{self.module.name}: the function for {self.what} of the loss{which} gives "
+                                            f"{given:.6g} as its derivative by {name} at t = {row[-1]:.6g}, and differences of "
+                                            f"its values give {found.central:.6g}; correct the derivative")
+
+    def _differences(self, function: Callable[..., Any], row: np.ndarray, column: int) -> _Differences | None:
+        """By one argument; None where the function is not defined to both sides."""
+        steps, values = np.array(DIFFERENCES) * (1 + abs(row[column])), list[float]()
+        for way in (-steps[0], -steps[1], 0.0, steps[1], steps[0]):
+            moved = row.copy()
+            moved[column] += way
+            found = self._one(function, moved)
+            if found is None:
+                return None
+            values.append(found[0])
+        far, h = steps
+        central = (values[3] - values[1]) / (2 * h)
+        return _Differences(central, (values[2] - values[1]) / h, (values[3] - values[2]) / h,
+                            abs(central - (values[4] - values[0]) / (2 * far)), float(np.abs(values).max()), h)
+
+    def _one(self, function: Callable[..., Any], row: np.ndarray) -> tuple[float, np.ndarray] | None:
+        """Value and derivatives (n,) of one function; None where it is not defined."""
+        p = self.p.copy()
+        p[list(self.of.free)] = row[self._by[self.of.n_x:]]
+        try:
+            found = cost_of(self.module, self.what, function, self._names, p)(row[-1:], row[None, self._x],
+                                                                              np.zeros((1, self.of.n_in)))
+        except EvaluationError as error:
+            if isinstance(error, InputRaised) and not isinstance(error.__cause__, OF_NUMBERS):
+                raise
+            self.raised = self.raised or error
+            return None
+        return found.values[0], np.concatenate([found.by_x[0], np.zeros(0) if found.by is None else found.by[0]])
+
     def _of_functions(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (N,) of all functions and their derivatives (N, n) by the state and free parameters; NaN where they are not
         finite. What is no matter of numbers, such as a name that is not there, is raised."""
         value, slopes = np.zeros(len(at)), np.zeros((len(at), len(self._by)))
-        inputs = np.zeros((1, self.of.n_in))
         for k, row in enumerate(at):
-            if not np.isfinite(row).all():
-                value[k], slopes[k] = np.nan, np.nan
-                continue
-            p = self.p.copy()
-            p[list(self.of.free)] = row[self._by[self.of.n_x:]]
             for function in self.functions:
-                try:
-                    found = cost_of(self.module, self.what, function, self._names, p)(row[-1:], row[None, self._x], inputs)
-                except EvaluationError as error:
-                    if isinstance(error, InputRaised) and not isinstance(error.__cause__, OF_NUMBERS):
-                        raise
-                    self.raised = self.raised or error
+                found = self._one(function, row) if np.isfinite(row).all() else None
+                if found is None:
                     value[k], slopes[k] = np.nan, np.nan
                     break
-                value[k] += found.values[0]
-                slopes[k] += np.concatenate([found.by_x[0], np.zeros(0) if found.by is None else found.by[0]])
+                value[k] += found[0]
+                slopes[k] += found[1]
         return value, slopes

@@ -90,6 +90,7 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     accuracy, max_iterations, options   of the solver; options: IPOPT's own; verbose: print its iterations
 
     Constraints of closed loops are kept at the ends of all intervals, for positions and velocities. All derivatives are exact.
+    Derivatives that functions of the cost give are compared with differences of their values, at the guess and at the result.
     The result is simulated back. An OptimumWarning reports errors above the tolerance on the last mesh, and a motion simulated
     back that differs by more than the root of the tolerance, 0.01 without one, relative to the largest value of a state plus 1;
     so does a cost integrated along the motion. Raises ArgumentError with all faults, NoOptimum with what is violated and by how
@@ -348,6 +349,7 @@ class _Search:
         tolerance, solved = chosen.tolerance, None
         while True:
             before, solved = solved, self._measured(*self._solved(breaks, steps, course), solved)
+            self._demand_derivatives(solved.made, solved.found.z)
             if not solved.found.solved:
                 raise self._failed(solved, before)
             too_large = tolerance is not None and not bool((solved.errors <= tolerance).all())
@@ -442,11 +444,27 @@ class _Search:
         for _ in range(4):
             made = Discretized(self.problem, mesh, steps, guess)
             self._demand_finite(made)
+            self._demand_derivatives(made, made.z)
             found = self._solve(made)
             if not found.solved or not made.normals.size or made.transversal(made.motion(found.z)) > TRANSVERSAL:
                 break
             guess = made.motion(found.z)
         return made, found
+
+    def _demand_derivatives(self, made: Discretized, z: np.ndarray) -> None:
+        """Raises ArgumentError where derivatives that functions of the cost give are not those of their values: at the start, in
+        the middle and at the end."""
+        if not np.isfinite(z).all():
+            return
+        motion, of = made.motion(z), self.problem.of
+        middle = made.mesh.nodes[[0, len(motion.X) // 2, -1]]
+        X, inputs = motion.X[[0, len(motion.X) // 2, -1]], np.zeros((3, of.n_in))
+        free = np.broadcast_to(motion.p[list(of.free)], (3, len(of.free)))
+        rows = np.hstack([X, inputs, free, (self.problem.t0 + middle * motion.T)[:, None]])
+        both = np.concatenate([X[0], rows[-1]])[None, :]
+        for cost, at in ((self.problem.integrand, rows), (self.problem.end_cost, both)):
+            if isinstance(cost, WithFunctions):
+                cost.demand_derivatives(at)
 
     def _solve(self, made: Discretized) -> Found:
         chosen = self.chosen
@@ -463,8 +481,8 @@ class _Search:
             if raised and isinstance(raised[0], InputRaised):
                 raise raised[0]
             what = str(raised[0]).removeprefix(f"{owner}: ") if raised else f"{program.f(made.z):g}"
-            raise EvaluationError(f"{owner}: the cost, or its derivative, is not finite at the guess: {what}; pass another guess, "
-                                  "or bounds where it is finite")
+            raise EvaluationError(f"{owner}: the cost, or its derivative, is not finite at the guess: {what}; pass another "
+                                  "guess, or bounds where it is finite")
         wrong = np.flatnonzero(~np.isfinite(program.g(made.z)))
         if len(wrong):
             raise EvaluationError(f"{owner}: {made.text(program, int(wrong[0]))} cannot be evaluated at the guess; pass another "

@@ -176,6 +176,35 @@ def test_exceptions_of_cost_functions(slider: Module, method: str) -> None:
         sd.optimize(slider, [EFFORT, sd.Loss(end=short_beyond)], 1.0, **small)
 
 
+@pytest.mark.parametrize("where", ["integral", "end"])
+def test_derivatives_of_cost_functions_that_are_wrong(slider: Module, where: str) -> None:
+    """Against differences of the values: at the guess, and at the result where the guess does not show it."""
+    wrong = lambda t, x, p: ((x[0] - 1) ** 2 + x[1], np.array([-2 * (x[0] - 1), 1.0]))
+    text = (rf"the function for the {where} of the cost of the loss gives 2 as its derivative by x at t = \d, and differences of "
+            r"its values give -2; correct the derivative")
+    with pytest.raises(sd.ArgumentError, match=text):
+        sd.optimize(slider, [EFFORT, sd.Loss(**{where: wrong})], 1.0)
+
+    def by_factor(t: float, x: np.ndarray, p: np.ndarray) -> Any:
+        return x[0] ** 2 + 3 * x[1], np.array([2 * x[0], 3.01])
+
+    with pytest.raises(sd.ArgumentError, match=r"\(by_factor\) gives 3.01 as its derivative by x_dot at t = .* give 3;"):
+        sd.optimize(slider, [EFFORT, sd.Loss(**{where: by_factor})], 1.0)
+    # At the guess, x = 0 all along, this is right.
+    later = lambda t, x, p: (x[0] ** 3 - 2 * x[0], np.array([-3 * x[0] ** 2 - 2, 0.0]))
+    with pytest.raises(sd.ArgumentError, match=r"gives \S+ as its derivative by x at t = \S+, and differences of its values give"):
+        sd.optimize(slider, [EFFORT, sd.Loss(**{where: later})], 1.0)
+
+
+def test_derivatives_of_cost_functions_at_kinks_and_where_they_are_not_defined(slider: Module) -> None:
+    """Derivatives to either side are right at a kink; where a function is not defined to both sides, nothing is compared."""
+    for side in (-1.0, 1.0):
+        kinked = lambda t, x, p, side=side: (abs(x[1]), np.array([0.0, np.sign(x[1]) or side]))
+        assert sd.optimize(slider, [EFFORT, sd.Loss(end=kinked)], 2.0, end=REST).cost == pytest.approx(1.5)
+    root = lambda t, x, p: (np.sqrt(x[0]) ** 3 if x[0] >= 0 else np.nan, np.array([1.5 * np.sqrt(x[0]), 0.0]))
+    assert sd.optimize(slider, [EFFORT, sd.Loss(end=root)], 2.0, end=REST).cost == pytest.approx(2.5)
+
+
 def test_mesh_that_is_not_fine_enough(slider: Module) -> None:
     text = r"the error of an interval, of the integral of the cost, is .* after 1 meshes, above the tolerance 1e-08"
     with pytest.warns(sd.OptimumWarning, match=text):
