@@ -192,7 +192,7 @@ def test_derivatives_of_cost_functions_that_are_wrong(slider: Module, where: str
         sd.optimize(slider, [EFFORT, sd.Loss(**{where: by_factor})], 1.0)
     # At the guess, x = 0 all along, this is right.
     later = lambda t, x, p: (x[0] ** 3 - 2 * x[0], np.array([-3 * x[0] ** 2 - 2, 0.0]))
-    with pytest.raises(sd.ArgumentError, match=r"gives \S+ as its derivative by x at t = \S+, and differences of its values give"):
+    with pytest.raises(sd.ArgumentError, match=r"gives \S+ as its derivative by x at t = \S+, and differences of its values"):
         sd.optimize(slider, [EFFORT, sd.Loss(**{where: later})], 1.0)
 
 
