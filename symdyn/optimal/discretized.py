@@ -385,7 +385,8 @@ class Discretized:
         end = self._end_cost(motion)
         size = float(sizes.sum()) + abs(end)
         quadrature = mesh.B @ self.flow().values(self._arguments(motion))[:, -1]
-        missing = np.maximum(np.abs(quadrature - by_interval) - accuracy, 0.0)
+        with np.errstate(invalid="ignore"):  # of costs that are infinite
+            missing = np.maximum(np.abs(quadrature - by_interval) - accuracy, 0.0)
         return float(by_interval.sum()) + end, np.divide(missing, size, out=missing, where=missing > 0)
 
     def cost_of(self, z: np.ndarray, simulated: Solution) -> float:
@@ -418,6 +419,23 @@ class Discretized:
         t = self.problem.t0 + self.mesh.breaks[1:] * motion.T
         now = normals(self.problem.module, t, motion.X[self.mesh.ends[1:]], motion.p, self.rows_of_loops)
         return float(np.linalg.svd(np.einsum("kxi,kxj->kij", self.normals, now), compute_uv=False).min())
+
+    def undetermined(self, z: np.ndarray) -> dict[str, np.ndarray]:
+        """Free parameters and inputs that cost and conditions do not depend on, neither at the guess nor at a solution, with
+        where they are in z."""
+        at, program, problem = self.layout, self.program, self.problem
+        moving = program.z_least < program.z_most
+        groups = dict(zip(problem.free, at.params[:, None], strict=True)) | dict(
+            zip(problem.module.metadata.inputs, at.U.T, strict=True))
+        used = np.zeros(program.n, dtype=bool)
+        for point in (self.z, z):
+            used |= program.gradient(point) != 0
+            used[program.jacobian_columns[program.jacobian(point) != 0]] = True
+        found = {name: where for name, where in groups.items() if moving[where].any() and not used[where].any()}
+        if found:
+            curved = program.hessian(z, 1.0, np.ones(program.m)) != 0
+            used[program.hessian_rows[curved]] = used[program.hessian_columns[curved]] = True
+        return {name: where for name, where in found.items() if not used[where].any()}
 
     def multipliers(self, lam: np.ndarray) -> dict[str, np.ndarray]:
         """Those of conditions of the user, by their texts."""

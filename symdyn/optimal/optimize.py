@@ -51,6 +51,10 @@ DEGREES = (1, 2, 3, 4)
 MISSED = 1e-6
 # What a motion simulated back may differ by without a warning, relative: without a tolerance; with one, its root.
 APART = 0.01
+# What cost and conditions may change by where nothing depends on a value.
+UNCHANGED = 1e-12
+# A cost that is as far below that of the guess, in units of it plus 1, has fallen without bound.
+FALLEN = 1e8
 # Of normals at the guess and at the solution: where the smallest singular value of their products is less, they are taken again.
 TRANSVERSAL = 0.5
 
@@ -376,6 +380,12 @@ class _Search:
             warnings.warn(f"{problem.module.name}: inputs {order} with degree {chosen.degree} under the condition {rough[0]}, "
                           "which holds coordinates, and the cost is that far from the least one; leave degree out, for 4",
                           OptimumWarning, stacklevel=3)
+        if self.undetermined:
+            few = len(self.undetermined) == 1
+            warnings.warn(f"{problem.module.name}: nothing depends on {', '.join(self.undetermined)} along the motion, so that "
+                          f"{'it keeps its' if few else 'they keep their'} guess and {'is' if few else 'are'} undetermined; "
+                          f"{'prescribe it' if few else 'prescribe them'}, or let the cost depend on "
+                          f"{'it' if few else 'them'}", OptimumWarning, stacklevel=3)
         apart = self._apart(optimum)
         if apart:
             warnings.warn(f"{problem.module.name}: {apart}; {self._finer(optimum)}", OptimumWarning, stacklevel=3)
@@ -445,11 +455,25 @@ class _Search:
             made = Discretized(self.problem, mesh, steps, guess)
             self._demand_finite(made)
             self._demand_derivatives(made, made.z)
-            found = self._solve(made)
+            found = self._kept(made, self._solve(made))
             if not found.solved or not made.normals.size or made.transversal(made.motion(found.z)) > TRANSVERSAL:
                 break
             guess = made.motion(found.z)
         return made, found
+
+    def _kept(self, made: Discretized, found: Found) -> Found:
+        """With the guesses of what nothing depends on, which solvers move away from bounds."""
+        self.undetermined: tuple[str, ...] = ()
+        if not found.solved or not np.isfinite(found.z).all():
+            return found
+        names, z, least = made.undetermined(found.z), found.z.copy(), made.program.violations(found.z)
+        for where in names.values():
+            z[where] = made.z[where]
+        same = abs(made.program.f(z) - found.cost) <= UNCHANGED * (1 + abs(found.cost))
+        if not names or not same or not (made.program.violations(z) <= least + UNCHANGED).all():
+            return found
+        self.undetermined = tuple(names)
+        return replace(found, z=z)
 
     def _demand_derivatives(self, made: Discretized, z: np.ndarray) -> None:
         """Raises ArgumentError where derivatives that functions of the cost give are not those of their values: at the start, in
@@ -514,9 +538,10 @@ class _Search:
         t = problem.t0 + mesh.nodes * motion.T
         metadata = problem.module.metadata
         optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
-                          {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
-                          solved.along, np.nan, motion.T, sum(r.iterations for r in solved.records), solved.records,
-                          float(solved.errors.max()), solved.errors, dict.fromkeys(metadata.x, np.nan), None,
+                          {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)},
+                          self.undetermined, found.cost, solved.along, np.nan, motion.T,
+                          sum(r.iterations for r in solved.records), solved.records, float(solved.errors.max()), solved.errors,
+                          dict.fromkeys(metadata.x, np.nan), None,
                           made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
                           found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, x, u)
         simulated, difference, cost = None, optimum.difference, np.nan
@@ -540,14 +565,17 @@ class _Search:
         """What to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
         owner, made, found = self.problem.module.name, solved.made, solved.found
         optimum = self._optimum(before or solved)
-        used_up = found.iterations >= self.chosen.max_iterations
         n = sum(record.iterations for record in solved.records)
         head = f"{owner}: no optimal motion was found in {n} iterations ({found.message})"
         if before is not None:
             head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {before.made.mesh.n_intervals} is kept"
-        if used_up:
+        fallen = self._fallen(made, found)
+        if fallen:
+            return NoOptimum(f"{head}; {fallen}", optimum)
+        if found.iterations >= self.chosen.max_iterations:
             return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess"
-                             f"{self._radau_instead()}", optimum)
+                             f"{self._radau_instead()}{self._kinked()}", optimum)
+        head += self._kinked()
         try:
             begin = made.motion(found.z) if np.isfinite(found.z).all() else made.guess
             elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True)
@@ -565,6 +593,33 @@ class _Search:
                 for k in np.argsort(-missed)[:4] if missed[k] > MISSED]
         return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",
                          optimum)
+
+    def _fallen(self, made: Discretized, found: Found) -> str:
+        """What to say of a cost that goes to minus infinity; nothing where it does not."""
+        begin = made.program.f(made.z)
+        if found.cost > begin - FALLEN * (1 + abs(begin)) or np.isnan(found.cost):
+            return ""
+        problem, motion = self.problem, made.motion(found.z)
+        inputs, states = problem.module.metadata.inputs, problem.module.metadata.x
+        rows = [(n, motion.U[:, k], problem.inputs[:, k]) for k, n in enumerate(inputs)]
+        rows += [(n, motion.p[[k]], bounds) for n, k, bounds in zip(problem.free, problem.of.free, problem.params.T, strict=True)]
+        open_ones = [(n, values) for n, values, bounds in rows if not np.isfinite(bounds).all()]
+        if not open_ones:
+            open_ones = [(n, motion.X[:, k]) for k, n in enumerate(states) if not np.isfinite(problem.states[:, k]).all()]
+        reached = ", ".join(f"{n} (up to {np.abs(values).max():.3g})" for n, values in open_ones)
+        return (f"the cost goes to minus infinity: it is {found.cost:.3g} at the last point"
+                + (f", and these have no bounds: {reached}; give them bounds, or a cost that grows with them" if reached else ""))
+
+    def _kinked(self) -> str:
+        """What to say of a cost with kinks, at which solvers that go by derivatives hardly end."""
+        kinks, inputs = self.problem.kinks, self.problem.module.metadata.inputs
+        if not kinks:
+            return ""
+        split = next((n for n in inputs if f"Abs({n})" in kinks), None)
+        instead = f"write {split} as the difference of two inputs with bounds (0, ...), whose sum is what it costs, or take " if (
+            split) else "take "
+        return (f"; the cost has kinks, by {', '.join(kinks)}, where solvers that go by derivatives hardly come to an end: "
+                f"{instead}a smooth law, such as sqrt(x**2 + eps**2) in place of Abs(x)")
 
     def _worst(self, made: Discretized, z: np.ndarray) -> str:
         """The largest violation where the solver ended."""

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 FREE = (-np.inf, np.inf)
 # Characters of a condition that messages and multipliers name it by.
 LONGEST = 120
+# What has kinks or jumps.
+KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.Piecewise, sp.floor, sp.ceiling)
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Problem:
     integrand  by [x; inputs; free parameters; t]; path: at all times, by the same
     end_cost, boundary   by [x at the start; x; inputs; free parameters; t], at the end
     timed      which of the rates "rhs", "outputs" and constraints "C" depend on t where the duration is free
+    kinks      parts of the cost that have kinks or jumps, as texts
     """
 
     module: Module
@@ -67,6 +70,7 @@ class Problem:
     path: Conditions
     boundary: Conditions
     timed: frozenset[str]
+    kinks: tuple[str, ...]
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -157,7 +161,12 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
     params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
     return Problem(module, of, p, t0, T, begin, stop, states, of_inputs, of_rates, params_bounds, integrand, end_cost, along,
-                   at_ends, timed)
+                   at_ends, timed, _kinks([e for one in losses for e in (one.integral, one.end)]))
+
+
+def _kinks(expressions: Sequence[Any]) -> tuple[str, ...]:
+    found = {str(part) for e in expressions if isinstance(e, sp.Basic) for part in e.atoms(*KINKED)}
+    return tuple(sorted(found))
 
 
 def _free_parameters(metadata: Any, given: Any, faults: Faults) -> dict[str, tuple[float, float]]:

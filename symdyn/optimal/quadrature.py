@@ -38,7 +38,8 @@ def integrals(f: Callable[[np.ndarray], np.ndarray], breaks: np.ndarray, relativ
         both, of_both = fine.sum(axis=1), absolute.sum(axis=1)
         # What is closed by now belongs to the whole size, too.
         least = relative * (np.nansum(size) + np.nansum(of_both))
-        still = (np.abs(both - coarse) > least) & (halved < HALVED - 1)  # not a number: closed
+        with np.errstate(invalid="ignore"):
+            still = (np.abs(both - coarse) > least) & (halved < HALVED - 1)  # not a number: closed
         found += np.bincount(of[~still], both[~still], K)
         size += np.bincount(of[~still], of_both[~still], K)
         if not still.any():

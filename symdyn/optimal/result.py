@@ -43,6 +43,7 @@ class Optimum(OverTime):
     t, x, inputs   times of the nodes (n_t,), s, states (n_t, n_x) and inputs (n_t, n_in) there; a name or symbol as an index
                    gives one of them over these times
     params         all parameters (n_p,); values: those that were free, by name
+    undetermined   names of free parameters and inputs that nothing depends on along the motion: they have their guesses
     cost, duration, iterations   cost: that is least, by the quadrature of the mesh; iterations: on all meshes; meshes: what each
                    of them took
     integrated_cost, simulated_cost   the cost integrated along the polynomials, and along the motion `simulated`, with error
@@ -73,6 +74,7 @@ class Optimum(OverTime):
     inputs: np.ndarray
     params: np.ndarray
     values: Mapping[str, float]
+    undetermined: tuple[str, ...]
     cost: float
     integrated_cost: float
     simulated_cost: float
@@ -150,7 +152,8 @@ class Optimum(OverTime):
                  f"{max(self.difference.values(), default=0.0):.2g}",
                  f"  integrated along it the cost is {self.integrated_cost:.9g}, {self.cost_difference:+.2g}; simulated back "
                  f"{self.simulated_cost:.9g}"]
-        lines += [f"  {name} = {value:.9g}" for name, value in self.values.items()]
+        lines += [f"  {name} = {value:.9g}{', undetermined' * (name in self.undetermined)}"
+                  for name, value in self.values.items()]
         return "\n".join(lines)
 
     def __repr__(self) -> str:

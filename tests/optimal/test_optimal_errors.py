@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -229,6 +230,66 @@ def test_a_finer_mesh_without_a_solution_keeps_that_of_the_mesh_before(slider: M
         sd.optimize(slider, sd.Loss(integral=F**2 + x**4), 2.0, end=REST, tolerance=1e-9, intervals=3)
     kept = error.value.optimum
     assert kept.success and len(kept.breaks) == 4 and max(kept.difference.values()) < 1e-2
+
+
+@pytest.mark.parametrize("method", ["ipopt", "slsqp"])
+def test_costs_that_go_to_minus_infinity(slider: Module, method: str) -> None:
+    small: dict[str, Any] = {"method": method, "tolerance": None, "intervals": 4, "max_iterations": 100}
+    text = r"the cost goes to minus infinity: it is -\S+ at the last point, and these have no bounds: F \(up to \S+\); give them"
+    with pytest.raises(sd.NoOptimum, match=text):
+        sd.optimize(slider, sd.Loss(end=-x), 1.0, **small)
+    assert sd.optimize(slider, sd.Loss(end=-x), 1.0, bounds={"F": (-1, 2)}, **small).cost == pytest.approx(-1.0)  # F T^2/2
+    if method == "slsqp":  # ends before it is far down by the parameter
+        return
+    system, a = _slider(), sd.parameters("a")
+    system.add_output("scaled", a * sd.coordinates("x"))
+    system.defaults = {a: 1}
+    with pytest.raises(sd.NoOptimum, match=r"these have no bounds: a \(up to \S+\); give them"):
+        sd.optimize(system.compile(backend="c"), sd.Loss(end=-sp.Symbol("scaled")), 1.0, bounds={"F": (1, 2)},
+                    parameters={"a": (0, np.inf)}, **small)
+
+
+def test_costs_with_kinks() -> None:
+    """The least integral of |F|, |F| <= 3, over d = 1/2 in T = 2: 3 N for t, then for as long back, 3 t (T - t) = d."""
+    system = _slider()
+    position, (plus, minus) = sd.coordinates("x"), sd.inputs("F_plus F_minus")
+    split = sd.System("split")
+    body = split.add_body("body", mass=1)
+    slide = split.add_joint(sd.Prismatic("slide", split.ground, body, axis=[1, 0], coordinate=position))
+    split.add_joint_force(slide, plus - minus)
+    given: dict[str, Any] = {"end": {"x": 0.5, "x_dot": 0}}
+    text = (r"the cost has kinks, by Abs\(F\), where solvers .*: write F as the difference of two inputs with bounds \(0, ...\), "
+            r"whose sum is what it costs, or take a smooth law")
+    with pytest.raises(sd.NoOptimum, match=text):
+        sd.optimize(system.compile(backend="c"), sd.Loss(integral=sp.Abs(F)), 2.0, bounds={"F": (-3, 3)}, **given)
+    found = sd.optimize(split.compile(backend="c"), sd.Loss(integral=plus + minus), 2.0, bounds={plus: (0, 3), minus: (0, 3)},
+                        transcription="shooting", hold=True, intervals=200, **given)
+    assert found.cost == pytest.approx(6 * (1 - np.sqrt(1 - 0.5 / 3)), rel=2e-3)
+    with pytest.raises(sd.NoOptimum) as error:
+        sd.optimize(system.compile(backend="c"), EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)})
+    assert "kinks" not in str(error.value)
+
+
+@pytest.mark.parametrize("method", ["ipopt", "slsqp"])
+def test_parameters_and_inputs_that_nothing_depends_on(method: str) -> None:
+    system = sd.System("idle")
+    position, mass, a, force, idle = sd.coordinates("x"), sd.parameters("m"), sd.parameters("a"), sd.inputs("F"), sd.inputs("G")
+    body = system.add_body("body", mass=mass)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=position))
+    system.add_joint_force(slide, force)
+    system.add_output("scaled", a * position + idle)
+    system.defaults = {mass: 1, a: 1}
+    module = system.compile(backend="c")
+    given: dict[str, Any] = {"end": REST, "method": method, "tolerance": None, "intervals": 4, "parameters": {"a": (0, 3)},
+                             "bounds": {"G": (-1, 4)}}
+    with pytest.warns(sd.OptimumWarning, match=r"nothing depends on a, G along the motion, so that they keep their guess and"):
+        found = sd.optimize(module, EFFORT, 1.0, guess={"G": 0.25}, **given)
+    assert found.undetermined == ("a", "G") and found.values["a"] == 1 and np.ptp([*found["G"], 0.25]) == 0
+    assert found.cost == pytest.approx(12) and "a = 1, undetermined" in str(found)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", sd.OptimumWarning)
+        known = sd.optimize(module, sd.Loss(integral=F**2, end=(sp.Symbol("scaled") - 2) ** 2), 1.0, **given)
+    assert known.undetermined == () and known.cost == pytest.approx(12)
 
 
 def test_without_casadi(slider: Module, monkeypatch: pytest.MonkeyPatch) -> None:
