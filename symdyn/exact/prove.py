@@ -14,11 +14,13 @@ from fractions import Fraction
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.exact.common import without_common_steps
+from symdyn.exact.exponentials import in_letters
 from symdyn.exact.ideal import Ideal
 from symdyn.exact.manifold import States, eliminated, nonzero_parameters, relations_of
 from symdyn.exact.ring import BOUND, TooLarge
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
 # States that are tried to refute a claim, digits of the evaluation; relative differences up to SAME are none, and up to ROUNDED
 # of the largest entry they may come from decimal numbers, which are rounded to doubles.
 STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
+# Every fourth state has numbers down to minus this.
+WIDE = 20.0
 # Of a difference that is rounding no more than this part remains with twice the digits.
 REMAINDER = 1e-10
 DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
@@ -111,6 +115,14 @@ def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
     >>> sd.prove(x**4 + x**2*y**2, x**2, on=x**2 + y**2 - 1)
     proved: on the relations
     """
+    try:
+        return _prove(a, b, on)
+    except RecursionError:
+        raise ArgumentError("prove was given expressions that are nested too deeply; name their parts by symbols, and prove what "
+                            "holds for these") from None
+
+
+def _prove(a: Any, b: Any, on: Any) -> Proof:
     left, right, columns = _entries(a, b)
     relations = [] if on is None else relations_of(on, [*left, *right])
     if any(isinstance(s, Timed) for e in (*left, *right, *relations) for s in symbols_of(e)):
@@ -129,6 +141,8 @@ def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
         return Proof(False, reason=UNFULFILLED)
     if relations and proof.verdict == "undecided" and _proved_by_elimination(left, right, relations):
         return Proof(True, reason=ON)
+    if not relations and proof.verdict == "undecided" and _proved_with_exponentials(left, right):
+        return Proof(True)
     if not proof.refuted:
         return proof
     letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
@@ -157,6 +171,12 @@ def _proved_by_elimination(left: Sequence[sp.Expr], right: Sequence[sp.Expr], re
     if any(e.is_number for e in rest):
         return False
     return prove(sp.Matrix(one), sp.Matrix(other), rest or None).proved
+
+
+def _proved_with_exponentials(left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> bool:
+    """Whether the sides are equal with any positive numbers for exponential functions of terms."""
+    letters = in_letters([*left, *right])
+    return letters is not None and not any(unproved(list(zip(letters[:len(left)], letters[len(left):]))))
 
 
 def _told(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
@@ -212,7 +232,7 @@ def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             value = sp.sympify(value, strict=True)
         if not isinstance(value, (sp.MatrixBase, sp.Expr)) or value.has(sp.nan, sp.zoo, sp.oo):
-            rows = f"; pass rows as sp.Matrix({name})" if isinstance(value, (list, tuple)) else ""
+            rows = f"; pass rows as sp.Matrix({name})" if isinstance(value, (list, tuple, np.ndarray)) else ""
             raise ArgumentError("prove takes expressions and matrices of SymPy and finite numbers; "
                                 f"{name} is {shown(value)}{rows}")
         sides.append(value)
@@ -301,6 +321,10 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
                 return Proof(True, reason=ON)
         if _proved_for_directions([differences[k] for k in doubtful], bound, unit_vectors, symbols):
             return Proof(True, reason=DIRECTIONS)
+        if exact.atoms:
+            doubtful = [k for k in doubtful if not _written_as_zero(exact, symbols, k)]
+            if not doubtful:
+                return Proof(True)
         reason = f"the normal forms differ{_by(exact, symbols, doubtful[0])}, at no state that was tried do the values"
         reason += _without_relations(exact)
     except TooLarge as error:
@@ -326,6 +350,11 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         return Proof(False, True, "the values differ", index(k), where)
     difference = Writer(exact, symbols).write(exact.values[k])
     return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _written_as_zero(exact: Exact, symbols: Mapping[Node, sp.Expr], k: int) -> bool:
+    """Whether SymPy's own rules for functions of functions, such as cos(acos(x)) = x, leave nothing of a short difference."""
+    return len(exact.values[k].num) <= WRITTEN and bool(Writer(exact, symbols).write(exact.values[k]) == 0)
 
 
 def _by(exact: Exact | None, symbols: Mapping[Node, sp.Expr], k: int, before: str = " by ") -> str:
@@ -397,8 +426,8 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
     draw = random.Random(1)
     tried: dict[Node, Any] = {}
     for attempt in range(STATES):
-        # Positive numbers first: roots and logarithms of them are real.
-        least = 0.2 if attempt % 2 == 0 else -2.0
+        # Positive numbers first: roots and logarithms of them are real; wide ones leave the first turn of an angle.
+        least = 0.2 if attempt % 2 == 0 else -2.0 if attempt % 4 == 1 else -WIDE
         values = drawn_state(draw, tape.inputs, least, symbols, unit_vectors)
         if on is not None:
             reached = on.near(values, 2 * DIGITS)

@@ -22,6 +22,7 @@ from symdyn.tape.tape import reachable
 
 x, y, z = sp.symbols("x y z", real=True)
 l, m = sp.symbols("l m", positive=True)
+p, r = sp.symbols("p r", positive=True)
 f = sp.Function("f")
 
 
@@ -120,10 +121,48 @@ print([sorted(s.assumptions0.items()) for s in recorded([sum(symbols)])[1].value
     assert len(told) == 1
 
 
+@pytest.mark.parametrize(("left", "right"), [
+    (sp.exp(x) * sp.exp(-y), sp.exp(x - y)),
+    (sp.exp(2 * x) - 1, (sp.exp(x) - 1) * (sp.exp(x) + 1)),
+    (sp.exp(x / 3) * sp.exp(x / 2), sp.exp(x * sp.Rational(5, 6))),
+    (sp.Matrix([0, sp.exp(x + 1)]), sp.Matrix([0, sp.E * sp.exp(x)])),
+    (sp.cosh(x) ** 2 - sp.sinh(x) ** 2, 1),
+    (sp.sinh(x + y), sp.sinh(x) * sp.cosh(y) + sp.cosh(x) * sp.sinh(y)),
+    (sp.tanh(2 * x) * (1 + sp.tanh(x) ** 2), 2 * sp.tanh(x)),
+    (p**x * r**x, (p * r) ** x),
+    (p ** (x + 1), p * p**x),
+    (sp.log(p * r**2), sp.log(p) + 2 * sp.log(r)),
+    (sp.cos(sp.acos(x) / 2) ** 2, (1 + x) / 2),
+])
+def test_relations_of_exponential_functions_and_logarithms(left, right):
+    assert sd.prove(left, right).proved
+    assert sd.prove(left, 2 * right).refuted
+
+
+@pytest.mark.parametrize(("left", "right"), [(sp.exp(1000 * x) * sp.exp(x + y), sp.exp(1001 * x + y)),
+                                              (sp.exp(sp.sin(x) ** 2) * sp.exp(sp.cos(x) ** 2), sp.E)])
+def test_exponential_functions_that_stay_undecided(left, right):
+    assert sd.prove(left, right).verdict == "undecided"
+
+
+def test_states_leave_the_first_turn_of_an_angle():
+    proof = sd.prove(sp.atan2(sp.sin(x), sp.cos(x)), x)
+    assert proof.refuted and abs(proof.state[x]) > sp.pi
+
+
+def test_expressions_that_are_nested_too_deeply(monkeypatch):
+    def too_deep(*_: object) -> None:
+        raise RecursionError
+
+    monkeypatch.setattr("symdyn.exact.prove.recorded", too_deep)
+    with pytest.raises(ArgumentError, match="nested too deeply; name their parts by symbols"):
+        sd.prove(sp.sin(x), x)
+
+
 @pytest.mark.parametrize(("left", "right", "reason"), [
-    (sp.exp(x) * sp.exp(-y), sp.exp(x - y), "undecided: the normal forms differ by exp(x)*exp(-y) - exp(x - y), at no state that "
-                                            "was tried do the values; functions whose relations are not all known: exp"),
-    (sp.Matrix([0, sp.exp(x + 1)]), sp.Matrix([0, sp.E * sp.exp(x)]), "undecided: entry [1]: the normal forms differ by"),
+    (sp.Max(x, y) + sp.Min(x, y), x + y, "undecided: the normal forms differ by -x - y + Max(x, y) + Min(x, y), at no state that "
+                                         "was tried do the values; functions whose relations are not all known: max, min"),
+    (sp.Matrix([0, sp.sign(x) * sp.Abs(x)]), sp.Matrix([0, x]), "undecided: entry [1]: the normal forms differ by"),
     (0.1 * x + 0.2 * x, 0.3 * x, "the sides differ by no more than the rounding of decimal numbers, 1e-12 of their size; pass "
                                  "fractions, such as sp.Rational('0.1') for 0.1"),
     (sp.zeta(x), sp.zeta(x), "has no counterpart in generated code"),
