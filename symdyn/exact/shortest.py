@@ -474,15 +474,15 @@ def written_out(entries: Sequence[Any]) -> dict[Node, int]:
     return sizes
 
 
-def _taken_out(e: Any) -> Any:
-    """What stands in several terms of a sum taken out of these: a b + a**2 c + d as a (b + a c) + d."""
+def _taken_out(e: Any, numbers: bool = False) -> Any:
+    """What stands in several terms of a sum taken out of these: a b + a**2 c + d as a (b + a c) + d; numbers: common ones too."""
     if not e.args or not e.has(sp.Add):
         return e
-    e = e.func(*[_taken_out(a) for a in e.args])
+    e = e.func(*[_taken_out(a, numbers) for a in e.args])
     if not e.is_Add:
         return e
     return sp.Add(*[sp.Mul(*[number, *[sp.Pow(b, n) for b, n in powers.items()]])
-                    for number, powers in _gathered([_powers(term) for term in e.args])])
+                    for number, powers in _gathered([_powers(term) for term in e.args], numbers)])
 
 
 def _powers(term: Any) -> tuple[Any, dict[Any, Any]]:
@@ -498,7 +498,7 @@ def _powers(term: Any) -> tuple[Any, dict[Any, Any]]:
     return number, powers
 
 
-def _gathered(terms: list[tuple[Any, dict[Any, Any]]]) -> list[tuple[Any, dict[Any, Any]]]:
+def _gathered(terms: list[tuple[Any, dict[Any, Any]]], numbers: bool) -> list[tuple[Any, dict[Any, Any]]]:
     """Terms with what stands in most of them taken out, again and again."""
     counts: dict[tuple[Any, bool], int] = {}
     for _, powers in terms:
@@ -517,10 +517,10 @@ def _gathered(terms: list[tuple[Any, dict[Any, Any]]]) -> list[tuple[Any, dict[A
     least = min([powers[common] for _, powers in having], key=abs)
     inside = [(number, {base: n - least if base == common else n for base, n in powers.items() if base != common or n != least})
               for number, powers in having]
-    total = sp.Add(*[sp.Mul(number, *[sp.Pow(b, n) for b, n in powers.items()]) for number, powers in _gathered(inside)])
-    number, powers = _powers(total)
+    total = sp.Add(*[sp.Mul(number, *[sp.Pow(b, n) for b, n in powers.items()]) for number, powers in _gathered(inside, numbers)])
+    number, powers = _powers(_number_out(total) if numbers else total)
     powers[common] = powers.get(common, 0) + least
-    return [(number, powers), *_gathered(others)]
+    return [(number, powers), *_gathered(others, numbers)]
 
 
 def _number_out(e: Any) -> Any:
@@ -550,8 +550,8 @@ def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, least
     count = int(sp.count_ops(found))
     if size > FACTOR_TERMS or count > NEAR * least:
         return found, count
-    taken = _taken_out(found)
-    forms = [(found, count), *map(_counted, [e for e in dict.fromkeys((taken, _number_out(taken))) if e != found])]
+    taken, other = _taken_out(found), _taken_out(found, numbers=True)
+    forms = [(found, count), *map(_counted, [e for e in dict.fromkeys((other, _number_out(other), taken)) if e != found])]
     return min(forms, key=lambda form: form[1])
 
 
