@@ -15,9 +15,10 @@ author = "the symdyn developers"
 release = version = symdyn.__version__
 html_title = f"symdyn {version}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "outside"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "tutorials", "outside"]
 exclude_patterns = ["extensions"]
 root_doc = "index"
+source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".myst": "markdown"}
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

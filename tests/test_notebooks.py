@@ -6,6 +6,7 @@ After changing a .py, write the .ipynb anew: python tests/test_notebooks.py
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,18 @@ def test_notebook_holds_no_outputs(source: Path) -> None:
         if cell.cell_type == "code":
             assert cell.outputs == []
             assert cell.execution_count is None
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
+def test_kept_results_belong_to_the_code(source: Path) -> None:
+    """What the pages show below the code was shown by that code, and every picture that they name is there."""
+    kept = json.loads((FOLDER / "results" / f"{source.stem}.json").read_text(encoding="utf-8"))
+    cells = [cell.source for cell in jupytext.read(source).cells if cell.cell_type == "code"]
+    codes = [hashlib.sha256(code.encode()).hexdigest()[:16] for code in cells]
+    assert [cell["code"] for cell in kept] == codes, f"run python docs/extensions/tutorials.py {source.stem}"
+    pictures = {output["image"] for cell in kept for output in cell["outputs"] if "image" in output}
+    assert pictures == {path.name for path in (FOLDER / "results").glob(f"{source.stem}_*.png")
+                        if path.stem.removeprefix(f"{source.stem}_").isdigit()}
 
 
 if __name__ == "__main__":

@@ -21,7 +21,8 @@ from tests.helpers import browser
 ROOT = Path(__file__).parents[1]
 # As wide as a screen, and as a telephone.
 WIDTHS = 1280, 400
-PAGES = ("index", "describing_mechanisms", "printing", "measured", "gallery", "gallery/puma560", "gallery/bicycle",
+PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "describing_mechanisms", "printing",
+         "measured", "gallery", "gallery/puma560", "gallery/bicycle",
          "reference/system", "reference/module", "contributing", "genindex")
 
 
@@ -116,6 +117,15 @@ def test_mechanisms_of_the_gallery_move(site: Path, shown: Any, name: str) -> No
             page.wait_for_timeout(500)
             assert view.evaluate(time) == 0
         page.close()
+
+
+def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
+    listed = (site / "tutorials.html").read_text(encoding="utf-8")
+    for source in sorted((ROOT / "notebooks").glob("*.py")):
+        page = (site / "tutorials" / f"{source.stem}.html").read_text(encoding="utf-8")
+        assert f'href="tutorials/{source.stem}.html"' in listed, source.stem
+        assert page.count('class="highlight-python') > 2 and f"{source.stem}.ipynb" in page, source.stem
+        assert 'class="highlight-text' in page or '<div class="formula">' in page, source.stem
 
 
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:
