@@ -201,7 +201,7 @@ class ModuleMetadata(Metadata):
     events, event_leaves   see EventRecord; entries of [t; x; inputs] whose ranges bound events
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
-    connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force")
+    connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line")
     down                   direction of gravity, zero where there is none
     output_units           of outputs that are points
     contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord; contact_groups: see GroupRecord

@@ -53,6 +53,9 @@ class Form:
             a, b = a - item.size[1] * up, a
         else:
             b = posed.at(item.ends[1])
+        if item.kind == "line":  # the beginning of what goes far beyond the picture
+            way = b - a
+            b = a + way * min(1.0, item.size[1] / (float(np.linalg.norm(way)) or 1.0))
         a, b = a + self.ends[0] * (b - a), a + self.ends[1] * (b - a)
         way = b - a
         length = float(np.linalg.norm(way))
@@ -116,7 +119,7 @@ def _forms(item: Item) -> list[Form]:
         return [Form(rod, item, radii=(size[0], size[0] / 4))]
     if item.kind == "rod":
         return [Form(rod, item, radii=(size[0], size[1]))]
-    if item.kind == "thread":
+    if item.kind in ("thread", "line"):
         return [Form(line(body, color, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), _THREAD), item)]
     found = []
     if item.kind in ("spring", "both"):

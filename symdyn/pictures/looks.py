@@ -20,6 +20,8 @@ _FLOATING = ("free", "planar", "custom", "modal")
 _SLIDING = ("prismatic", "cylindrical", "helical")
 # Closer than this, relative to the mechanism, are points that are the same; what counts as extended.
 _SAME, _EXTENT = 1e-6, 0.02
+# How much of a mooring line stills show, of the mechanism's length.
+_LINE = 0.4
 # Radius of a link, of the mechanism's length.
 _RADIUS = 0.02
 # Half the length of a rail on which nothing has moved, of the mechanism's length.
@@ -66,6 +68,13 @@ class Mechanism:
         """All points, (n, 3), in the order of their indices: joints on parent and child, centres, origins, ends of springs."""
         return np.concatenate([part.reshape(-1, 3) for part in (self.joint_points, self.centres, self.frames[:, :3],
                                                                 self.spring_points)])
+
+    @property
+    def near_points(self) -> np.ndarray:
+        """The points without the anchors of mooring lines, which are far away."""
+        first = len(self.points) - 2 * len(self.connections)
+        far = [first + 2 * k + 1 for k, (*_, kind) in enumerate(self.connections) if kind == "line"]
+        return np.delete(self.points, far, axis=0)
 
     @property
     def carriers(self) -> frozenset[int]:
@@ -136,7 +145,8 @@ def up_of(down: Sequence[float], planar: bool) -> tuple[float, float, float]:
 class Item:
     """A solid: its kind, what it hangs on, its sizes in m, its colour, what it is called.
 
-    kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc
+    kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc; line: of a mooring, whose second
+            size is how much of it a still shows
     axis    index of the joint's axis; turn: (9,), own axes in body axes, of boxes and ellipsoids, row by row
     layer   "" for what is always shown, else what shows it: "inertia", "centres"
     """
@@ -157,7 +167,7 @@ def looks_of(m: Mechanism) -> tuple[list[Item], float]:
     length = _length(m)
     r = _RADIUS * length * (1.0 if len(m.bodies) <= 8 else 0.7)
     carriers = m.carriers
-    items = [*_joints(m, r, length, carriers), *_springs(m, r)]
+    items = [*_joints(m, r, length, carriers), *_springs(m, r, length)]
     for body in range(len(m.bodies)):
         if body not in m.drawn and body not in carriers:
             items += [replace(item, body=body) for item in _body(m, body, r, length)]
@@ -167,7 +177,7 @@ def looks_of(m: Mechanism) -> tuple[list[Item], float]:
 
 def _length(m: Mechanism) -> float:
     """How far points of the mechanism are apart, at most; of a single body its size, from its inertia."""
-    spans = [float(np.linalg.norm(np.ptp(m.points, axis=0)))]
+    spans = [float(np.linalg.norm(np.ptp(m.near_points, axis=0)))]
     for body in range(len(m.bodies)):
         own = [m.local(body, point) for point, owner in zip(m.points, m.owners(), strict=True) if owner == body]
         spans.append(float(np.linalg.norm(np.ptp(own, axis=0))) * (1.0 if len(m.bodies) == 1 else 1.5))
@@ -207,12 +217,13 @@ def _joints(m: Mechanism, r: float, length: float, carriers: frozenset[int]) -> 
             yield Item("stand", (2 * j + int(ends[1] == GROUND),), (3.2 * r, 4.5 * r), METAL, f"{title}, on the ground")
 
 
-def _springs(m: Mechanism, r: float) -> Iterator[Item]:
+def _springs(m: Mechanism, r: float, length: float) -> Iterator[Item]:
     first = 2 * len(m.joints) + 2 * len(m.bodies)
     for k, (name, _, _, kind) in enumerate(m.connections):
         ends = (first + 2 * k, first + 2 * k + 1)
-        yield Item("thread" if kind == "force" else kind, ends, (0.3 * r,) if kind == "force" else (1.3 * r,), STEEL,
-                   f"{name} ({'spring and damper' if kind == 'both' else kind})")
+        size = (0.3 * r,) if kind == "force" else (0.2 * r, _LINE * length) if kind == "line" else (1.3 * r,)
+        yield Item("thread" if kind == "force" else kind, ends, size, STEEL,
+                   f"{name} ({'spring and damper' if kind == 'both' else 'mooring line' if kind == 'line' else kind})")
 
 
 def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
@@ -263,7 +274,8 @@ def _attached(m: Mechanism, body: int, length: float) -> list[tuple[Ref, np.ndar
     ends = [(j, side) for side in (1, 0) for j, (_, *names, kind) in enumerate(m.joints)
             if m.index(names[side]) == body and kind not in _FLOATING]
     candidates = [(2 * j + side, j) for j, side in ends] + [
-        (springs + k, -1) for k, owner in enumerate(m.owners()[springs:]) if owner == body]
+        (springs + k, -1) for k, owner in enumerate(m.owners()[springs:]) if owner == body
+        and m.connections[k // 2][3] != "line"]
     every = [(ref, m.local(body, m.points[ref]), j) for ref, j in candidates] + [
         ((body, *tip), tip, -1) for owner, tip in (*m.tips, *m.corners) if owner == body]
     for ref, point, j in every:

@@ -80,7 +80,7 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
         base = ends[0] - size[1] * np.array(m.up)
         ring = _ring(np.array(m.up), 1.0, 0.0)
         yield from _hull(np.concatenate([base + size[0] * ring, ends[0] + size[0] / 4 * ring]), axes, item.color)
-    elif len(ends) == 2:
+    elif len(ends) == 2 and kind != "line":
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
         if kind in ("spring", "damper", "both"):
             ends = list(_zigzag(ends[0], ends[1], size[0], axes))

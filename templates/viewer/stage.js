@@ -43,7 +43,7 @@ class Stage {
     reach(scene) {
         const found = [];
         const { source } = scene;
-        for (const item of scene.items) if (!item.layer && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
+        for (const item of scene.items) if (!item.layer && item.kind !== "line" && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
             for (const end of item.ends) {
                 const p = source.at(end), r = Math.max(...item.size) * (item.ends.length > 1 ? 0.6 : 1);
                 for (const e of [[r, r, r], [-r, -r, -r], [r, -r, r], [-r, r, -r]]) found.push(add(p, e));
@@ -207,7 +207,7 @@ class Stage {
         } else {
             const b = source.at(item.ends[1]);
             if (kind === "rod") this.rod(scene, a, b, s, color, name);
-            else if (kind === "thread") {
+            else if (kind === "thread" || kind === "line") {
                 const [eye] = this.eye, r = Math.max(s[0], 0.0012 * size(minus(eye, a)));
                 this.rod(scene, a, b, [r, r], color, name);
             } else {

@@ -68,6 +68,24 @@ def test_springs_follow_their_ends() -> None:
     assert np.allclose([(places[0], places[-1]) for places in coils], ends)
 
 
+def test_mooring_lines_go_from_the_fairlead_towards_the_anchor() -> None:
+    """They do not make the picture as large as the way to their anchors."""
+    system = sd.System("float", gravity=[0, 0, -9.81])
+    box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    fairlead, anchor = np.array([0.5, 0, 0.2]), np.array([60.0, 0, -20])
+    system.add_load(sd.MooringLine(box, fairlead, anchor, length=70, weight=100, stiffness=1e6, name="line"))
+    solution = system.compile(backend="numpy").simulate((0, 0.1), q=[-0.1])
+    assert solution.module.metadata.connections == (("line", "box", "ground", "line"),)
+    ends = solution.rows("spring_points").reshape(len(solution.t), 2, 3)
+    assert np.allclose(ends[:, 0], fairlead + np.array([0, 0, 1]) * solution.q) and np.allclose(ends[:, 1], anchor)
+    (line,) = [places for form, places in placed(solution, -1) if form.item.kind == "line"]
+    way = line[1] - line[0]
+    assert np.allclose(line[0], ends[-1, 0]) and np.allclose(np.cross(way, anchor - ends[-1, 0]), 0, atol=1e-9)
+    drawing = Drawing.of(solution)
+    assert drawing is not None and np.ptp(drawing.limits(), axis=1).max() < 5
+
+
 def test_what_moves_in_a_plane_of_space_is_seen_from_the_front() -> None:
     """A pendulum in the x-z plane of a system in space: x to the right and z up, its solids nearer to the eye hide the others."""
     system = sd.System("swing", gravity=[0, 0, -9.81])

@@ -17,6 +17,7 @@ from symdyn.formulation.printed.provenance import OfBodies
 from symdyn.formulation.trees.chosen_speeds import algebra_of
 from symdyn.formulation.trees.quantities import TreeQuantities
 from symdyn.formulation.trees.tree import Tree, build
+from symdyn.model.elements import MooringLine
 from symdyn.model.joints import Fixed, Joint, Modal
 from symdyn.model.loads import ForceBetween, SpringDamper, expressions_of
 from symdyn.model.orientation import EulerAngles, EulerParameters
@@ -102,7 +103,8 @@ def _connections(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str],
             return "force"
         return "damper" if load.stiffness == 0 else "spring" if load.damping == 0 else "both"
 
-    return tuple((load.label, name_of(load.body_a), name_of(load.body_b), kind(load)) for load in quantities.connections)
+    return tuple((load.label, name_of(load.body), "ground", "line") if isinstance(load, MooringLine) else
+                 (load.label, name_of(load.body_a), name_of(load.body_b), kind(load)) for load in quantities.connections)
 
 
 def _down(model: Model) -> tuple[float, float, float]:

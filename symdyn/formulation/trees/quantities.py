@@ -25,7 +25,7 @@ from symdyn.formulation.trees.kinematics import Kinematics
 from symdyn.formulation.trees.newton_euler import inward, outward
 from symdyn.formulation.trees.reactions import reactions
 from symdyn.formulation.trees.tree import GROUND, Tree
-from symdyn.model.elements import Element
+from symdyn.model.elements import Element, MooringLine
 from symdyn.model.joints import Joint
 from symdyn.model.loads import ForceBetween, SpringDamper
 from symdyn.model.orientation import EulerAngles
@@ -236,15 +236,23 @@ class TreeQuantities(Motion):
         return np.array(rows, dtype=object).reshape(-1, 3)
 
     @property
-    def connections(self) -> tuple[SpringDamper | ForceBetween, ...]:
-        """The loads along the line between two points."""
-        return tuple(load for load in self.model.loads if isinstance(load, (SpringDamper, ForceBetween)))
+    def connections(self) -> tuple[SpringDamper | ForceBetween | MooringLine, ...]:
+        """The loads along the line between two points, and mooring lines."""
+        return tuple(load for load in self.model.loads if isinstance(load, (SpringDamper, ForceBetween, MooringLine)))
 
     def spring_points(self) -> np.ndarray:
         """Both ends of every load along a line, n-frame, m, (n, 6)."""
-        ends = [end for load in self.connections for end in ((load.body_a, load.point_a), (load.body_b, load.point_b))]
-        return np.array([self.kinematics.position(self.loads.pose(body), self.algebra.constants(point)) for body, point in ends],
-                        dtype=object).reshape(-1, 6)
+        rows: list[Any] = []
+        for load in self.connections:
+            if isinstance(load, MooringLine):
+                rows += [self._on(load.body, load.fairlead), self.algebra.constants(load.anchor)]
+            else:
+                rows += [self._on(load.body_a, load.point_a), self._on(load.body_b, load.point_b)]
+        return np.array(rows, dtype=object).reshape(-1, 6)
+
+    def _on(self, body: Any, point: Any) -> Any:
+        """A point of a body in the n-frame."""
+        return self.kinematics.position(self.loads.pose(body), self.algebra.constants(point))
 
     def reactions(self) -> np.ndarray:
         """Force and moment of each joint on its child, at its point on the child, n-frame, (n_joints, 6)."""
