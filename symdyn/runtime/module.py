@@ -708,7 +708,9 @@ class Module:
                     else 0); see `Solution.sensitivity` and docs/derivatives.md. Compiled methods only
         sensitivity_control   whether the steps keep the errors of the sensitivities within the tolerances, too; False: those of
                     the state alone
-        step        length of the steps of method="moreau", s; 0: it is halved until the coordinates agree within the tolerances
+        step        length of the steps of method="moreau", s; 0: it is halved until the coordinates agree within the tolerances.
+                    With method="auto" switches of contacts are located as long as they come slower than one in a step; where 200
+                    of them come faster, the whole motion is made by time stepping
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,

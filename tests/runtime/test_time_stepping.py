@@ -12,6 +12,7 @@ import pytest
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.module import Module
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 G = 9.81
@@ -282,3 +283,29 @@ def test_a_step_that_is_too_long_is_reported() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert ball().simulate((0, 1), q=[1.0], method="moreau", step=0.5).success
+
+
+def test_auto_takes_time_stepping_where_switches_come_faster_than_one_in_a_step() -> None:
+    y = sd.coordinates("y")
+    system = sd.System("rattle", gravity=[0, -10])
+    body = system.add_body("ball", mass=1.0)
+    system.add_joint(sd.Prismatic("height", system.ground, body, axis=[0, 1], coordinate=y))
+    system.add_contact(sd.Contact("floor", body, system.ground, restitution=1))
+    module = system.compile()
+    slow = module.simulate((0, 2), q=[5e-4], method="auto", step=2e-3)  # flights of 0.02 s
+    assert slow.stepped is None and len(slow.contacts["floor"].impacts.t) == 100
+    quick = module.simulate((0, 5), q=[5e-6], method="auto", step=1e-2)  # of 0.002 s
+    assert quick.stepped is not None and quick.method == "moreau" and quick.success
+    assert "200 switches of contacts until t = 0.399 s came within 0.398 s, faster than one in a step of 0.01 s" in quick.why
+    with pytest.raises(ArgumentError, match="moreau"):
+        stop_and_go().simulate((0, 1), method="auto", step=1e-3)
+    with pytest.raises(ArgumentError, match="which method='auto' takes where switches of contacts come faster"):
+        module.simulate((0, 1), q=[1.0], method="dop853", step=1e-3)
+
+
+def stop_and_go() -> Module:
+    system = sd.System("clutch")
+    body = system.add_body("rotor", mass=1.0, inertia=[1, 1, 1])
+    system.add_joint(sd.Revolute("shaft", system.ground, body, axis=[0, 0, 1], coordinate=sd.coordinates("q")))
+    system.add_contact(sd.OneWayClutch("clutch", "shaft"))
+    return system.compile()

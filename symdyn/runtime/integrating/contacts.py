@@ -49,6 +49,8 @@ NO_SPEED = 1e-11
 # So many switches within SAME_TIME of the run: the modes do not settle. So many that follow each other, in the mean, after less
 # than SHORTEST_FLIGHT of the run do not come to an end.
 MOST_SWITCHES, SAME_TIME, MOST_SHORT = 50, 1e-13, 1000
+# So many that follow each other faster than one in a step of time stepping are left to it, where method="auto" may.
+MOST_FAST = 200
 # What is added to the diagonal of rows that depend on each other, by its size.
 SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
@@ -201,7 +203,7 @@ def run_contacts(module: Module, request: Request, part: Part, method: object = 
     method   the one that it integrates by else
     crossed  takes the switches, for a way back
 
-    Raises ArgumentError for what contacts do not take.
+    Raises ArgumentError for what contacts do not take, TooFast where switches come faster than one in request.step.
     """
     begin, end = request.span
     if end < begin:
@@ -225,6 +227,10 @@ class Made(NamedTuple):
     still: tuple[bool, ...]
     touching: tuple[int, ...] = ()
     hit: tuple[int, ...] = ()
+
+
+class TooFast(Exception):
+    """Switches that follow each other faster than one in a step of time stepping: what Solution.why adds."""
 
 
 class _Stop(Exception):
@@ -365,6 +371,11 @@ class _Phases:
         if fired:
             self.recent.append((t, tuple(k for k, _ in fired)))
             begin, end = self.request.span
+            if self.request.step and len(self.recent) >= MOST_FAST:
+                passed_by = t - self.recent[-MOST_FAST][0]
+                if passed_by < (MOST_FAST - 1) * self.request.step:
+                    raise TooFast(f"{MOST_FAST} switches of contacts until t = {t:.6g} s came within {passed_by:.3g} s, faster "
+                                  f"than one in a step of {self.request.step:g} s, so that steps go across them")
             first = self.recent[0][0]
             if len(self.recent) == MOST_SHORT and t - first < MOST_SHORT * SHORTEST_FLIGHT * (end - begin):
                 often = Counter(self.records[k].name for _, of in self.recent for k in of)

@@ -77,7 +77,8 @@ class Request:
     carried   of events, where the run goes on from the end of another one
     event_spacing   of the samples of events at the most, s; 0: as they vary
     input_columns   derivatives of inputs that are held along the columns, (n_held, n_columns)
-    step      of time stepping, s; 0: halved until the tolerances are met
+    step      of time stepping, s; 0: halved until the tolerances are met; of other methods: what switches of contacts may come
+              faster than no more than for a while, 0: as fast as they come
     columns, held, followed   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
     """
 

@@ -24,7 +24,7 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.automatic import automatic
 from symdyn.runtime.integrating.charts import warn_near_lock
 from symdyn.runtime.integrating.compiled import run_compiled
-from symdyn.runtime.integrating.contacts import check_overlap, run_contacts
+from symdyn.runtime.integrating.contacts import TooFast, check_overlap, run_contacts
 from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
@@ -84,9 +84,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                       max_steps, len(start), look=looked_for(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
     request = replace(request, step=checked_positive(module, step, "step"))
-    if request.step and method != MOREAU:
-        raise ArgumentError(f"{module.name}: step is the length of the steps of method='moreau'; other methods choose theirs by "
-                            "rtol and atol, and take max_step")
+    if request.step and method not in (MOREAU, "auto"):
+        raise ArgumentError(f"{module.name}: step is the length of the steps of method='moreau', which method='auto' takes where "
+                            "switches of contacts come faster; other methods choose theirs by rtol and atol, and take max_step")
     asked, controlled = Asked.of(module, sensitivities, p, free), flag(sensitivity_control, f"{module.name}: sensitivity_control")
     if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
@@ -103,7 +103,11 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             if metadata.contact_groups:
                 check_spheres_apart(module, span[0], start, p, free.at(span[0], start))
         why = ""
-        if isinstance(method, str) and method == "auto":
+        if isinstance(method, str) and method == "auto" and request.step:
+            check_moreau(module, request, stabilization)
+        if isinstance(method, str) and method == "auto" and metadata.contact_groups:
+            method, why = MOREAU, "contacts of a group are found in steps of one length"
+        elif isinstance(method, str) and method == "auto":
             blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())
             method, why = automatic(module, blind, lambda asked, name: _trial(module, asked, name))
         if is_compiled(method):
@@ -129,7 +133,12 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if asked.columns:
             whole = asked.added_to(request, controlled, metadata.inputs)
         begun = clock.perf_counter()
-        outcome = integrate(module, whole, method, bar)
+        try:
+            outcome = integrate(module, whole, method, bar)
+        except TooFast as found:
+            method, why = MOREAU, f"{why}; {found}"
+            whole = replace(whole, stabilization=stabilization_of(module, request, method, stabilization))
+            outcome = integrate(module, whole, method, bar)
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
