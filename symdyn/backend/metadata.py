@@ -118,7 +118,7 @@ class EventRecord(NamedTuple):
 class ContactRecord(NamedTuple):
     """A rigid contact in one place: the contact that it is of, its number of rows, the parameters that its mode is set by ("" and
     none without friction), what its events are called after its name, its law of impacts, its kind, whether its first row is a
-    normal one."""
+    normal one, parameters that are lengths of its shapes."""
 
     name: str
     contact: str
@@ -130,6 +130,7 @@ class ContactRecord(NamedTuple):
     impact: str
     kind: str
     normal: bool
+    lengths: tuple[str, ...] = ()
 
     @property
     def tangents(self) -> int:

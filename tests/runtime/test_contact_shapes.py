@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import symdyn as sd
@@ -143,3 +145,18 @@ def test_pair_of_forces_does_no_work_but_against_slip_and_keeps_momentum() -> No
     impulse = touch.impacts.impulse[0]
     assert np.linalg.norm(impulse[1:]) <= 0.3 * impulse[0] * (1 + 1e-9)
     assert solution.energy[-1] < solution.energy[0]
+
+
+def test_a_road_given_as_a_spline_is_that_of_its_polynomials() -> None:
+    """Where a point that falls on it turns back is a zero of SciPy's own spline, also beyond its ends."""
+    along = np.linspace(-1, 1, 9)
+    road = CubicSpline(along, 0.2 * np.sin(3 * along))
+    system = sd.System("road", gravity=[0, -10])
+    body = system.add_body("body", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_contact(sd.Contact("sole", body, system.ground, shape=(Shapes.Point(), Shapes.Curve(road, X)), restitution=0.5))
+    module = system.compile()
+    for x, speed in ((-0.9, 3.0), (0.2, -1.0), (0.9, 1.0)):
+        found = module.simulate((0, 0.6), q=[x, 1.0, 0], u=[speed, 0, 0], rtol=1e-12).contacts["sole"].impacts.t[0]
+        expected = brentq(lambda t, x=x, speed=speed: 1 - 5 * t**2 - road(x + speed * t), 0.2, 0.6, xtol=1e-14)
+        assert found == pytest.approx(expected, abs=1e-12)

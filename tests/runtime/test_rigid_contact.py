@@ -463,6 +463,20 @@ def test_coefficients_that_parameters_make_impossible(values: tuple[float, float
         system.compile(backend="numpy").simulate((0, 1), q=[1.0], params=dict(zip((static, kinetic, e), values, strict=True)))
 
 
+def test_lengths_that_parameters_make_impossible_and_normals_without_direction_are_reported() -> None:
+    r = sd.parameters("r")
+    system = planar("wheel", [sd.Contact("rim", "body", "ground", shape=sd.contacts.Sphere(r), friction=0.1)], 1.0, 0.1)
+    system.defaults[r] = 0.1
+    with pytest.raises(ArgumentError, match=r"r, a length of contact rim, is -0\.2; pass a number"):
+        system.compile().simulate((0, 1), q=[0, 1, 0], params={r: -0.2})
+    with pytest.raises(ModelError, match=r"edge 2 of the box is -0\.2"):
+        planar("box", [sd.Contact("corner", "body", "ground", shape=sd.contacts.Box([0.4, -0.2]))], 1.0, 0.1).compile()
+    shape = (sd.contacts.Sphere(0.1), sd.contacts.Sphere(0.1))
+    one_in_the_other = planar("balls", [sd.Contact("touch", "body", "ground", shape=shape)], 1.0, 0.1).compile()
+    with pytest.raises(EvaluationError, match="contact touch: its normal has no direction: points at one place"):
+        one_in_the_other.simulate((0, 1))
+
+
 def test_static_friction_without_a_number_is_not_compared() -> None:
     system = ball(friction=(sd.parameters("mu_s"), 0.3))
     system.check()

@@ -72,8 +72,10 @@ class ContactRows:
                         H[k, first] = free
                     else:  # friction of a joint, whose force is known
                         fixed[k] = free
-                reasons += [f"contact {c.name}: its friction jams, there is no acceleration with a finite force "
-                            "(Painleve)"] * len(rows)
+                jams = "its friction jams, there is no acceleration with a finite force (Painleve), or " * (
+                    c.normal and len(c.rows) > c.normal)
+                reasons += [f"contact {c.name}: {jams}its normal has no direction: points at one place, a disc that lies flat, a "
+                            "curve that ends" if c.normal else f"contact {c.name}: nothing moves along it"] * len(rows)
                 sizes += [sum((self.D[k, k] for k in rows), 0)] * len(rows)
                 first += len(rows)
             A, shared = self.D @ H, a.expression(SOFTNESS)

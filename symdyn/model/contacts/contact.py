@@ -85,14 +85,24 @@ class Contact:
         """Whether there is no friction by structure."""
         return self.static == 0 and self.kinetic == 0
 
+    @property
+    def lengths(self) -> dict[str, sp.Expr]:
+        """Radii and lengths of its shapes, by what they are called in messages."""
+        found = {}
+        for what, shape in (("on a", self.on_a), ("on b", self.on_b)):
+            for kind in ("radius", "length"):
+                if hasattr(shape, kind):
+                    found[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
+            if isinstance(shape, Box):
+                found |= {f"edge {k + 1} of the box": Faults().expression(e, "size") for k, e in enumerate(
+                    shape.size if isinstance(shape.size, (list, tuple)) else ())}
+        return found
+
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
         found = []
         values = {"static friction": self.static, "kinetic friction": self.kinetic, "restitution": self.restitution}
-        for what, shape in (("on a", self.on_a), ("on b", self.on_b)):
-            for kind in ("radius", "length"):
-                if hasattr(shape, kind):
-                    values[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
+        values |= self.lengths
         number = partial(value_of, defaults=defaults)
         if self.law == "compliant":
             found += compliance_faults(self.where, self.compliance, number, self.kinetic)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.model.contacts.contact import Contact
@@ -148,7 +149,9 @@ class Geometry:
         """Above a curve or surface of body b."""
         arm = _add(place, self._position(self.b, (sp.S.Zero,) * 3), -1)
         local = arm if self._still(self.b) else tuple(_dot(column, arm) for column in self._columns(self.b))
-        height = self.faults.expression(graph.height, f"{self.contact.where}: height")
+        spline = isinstance(graph, Curve) and isinstance(graph.x, sp.Symbol) and _is_spline(graph.height)
+        height = _polynomials(graph.height, graph.x) if spline else self.faults.expression(
+            graph.height, f"{self.contact.where}: height")
         symbols = [graph.x] if isinstance(graph, Curve) else [graph.x, graph.y]
         if not all(isinstance(s, sp.Symbol) for s in symbols):
             self.faults.append(f"{self.contact.where}: the curve's abscissa is {symbols}; pass the symbols that its height is "
@@ -217,6 +220,24 @@ class Geometry:
 
     def _vector(self, value: Any, what: str) -> Triple:
         return tuple(self.faults.vector(value, f"{self.contact.where}: {what}", self.planar))
+
+
+def _is_spline(value: Any) -> bool:
+    """Whether it has breaks x and coefficients c of polynomials between them, as splines of SciPy."""
+    x, c = getattr(value, "x", None), getattr(value, "c", None)
+    return (isinstance(x, np.ndarray) and isinstance(c, np.ndarray) and x.ndim == 1 and c.ndim == 2
+            and c.shape[1] == len(x) - 1 > 0 and bool(np.isfinite(x).all() and np.isfinite(c).all()))
+
+
+def _polynomials(spline: Any, x: sp.Symbol) -> sp.Expr:
+    """A spline as polynomials piece by piece; beyond its ends those of the ends go on."""
+    pieces = []
+    for k, column in enumerate(spline.c.T.tolist()):
+        at, value = x - sp.Float(float(spline.x[k])), sp.S.Zero
+        for coefficient in column:
+            value = value * at + sp.Float(coefficient)
+        pieces.append((value, x < sp.Float(float(spline.x[k + 1])) if k + 2 < len(spline.x) else True))
+    return sp.Piecewise(*pieces)
 
 
 def _add(a: Sequence[Any], b: Sequence[Any], sign: int = 1) -> Triple:

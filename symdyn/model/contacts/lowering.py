@@ -51,6 +51,7 @@ class RigidContact:
     events    what its events are called after its name
     kind      BODIES, or that of the element of joints
     at, acting   where it touches and the force on body a, n-frame; empty of an element of joints
+    lengths   parameters that are radii and lengths of its shapes
     """
 
     name: str
@@ -69,6 +70,7 @@ class RigidContact:
     kind: str = BODIES
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
+    lengths: tuple[str, ...] = ()
 
     @property
     def normal(self) -> bool:
@@ -178,7 +180,8 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
         events |= {IGNORED: contact.ignored, COUNTS: contact.ignored}
     system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
-                                              tuple(events), at=geometry.place(touch), acting=_along(directions, forces)))
+                                              tuple(events), at=geometry.place(touch), acting=_along(directions, forces),
+                                              lengths=tuple(s.name for s in contact.lengths.values() if s.is_Symbol)))
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
         system.events.append(Event(f"{name}_{what}", value, 1 if what == IGNORED else -1, True, ()))

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
     from symdyn.given import Scalar, Vector
 
 ORIGIN, UP = (0, 0, 0), (0, 0, 1)
@@ -129,7 +131,8 @@ class Bore:
 class Curve:
     """A curve y = f(x) in the axes of body b of a planar system, with body a above it.
 
-    height   f, m, an expression of x and parameters
+    height   f, m, an expression of x and parameters, or a spline such as SciPy's CubicSpline, beyond whose ends the polynomials
+             of the ends go on
     x        the symbol of the abscissa
 
     The gap of a point is (y - f)/sqrt(1 + f'^2), which is the distance to first order and zero on the curve.
@@ -139,7 +142,7 @@ class Curve:
     x**2/10
     """
 
-    height: Scalar
+    height: Scalar | PPoly
     x: sp.Symbol
 
 

@@ -101,9 +101,12 @@ def _numbers_of(metadata: ModuleMetadata, values: np.ndarray) -> Numbers:
                    rest[3 * n:speeds].reshape(n, n), rest[speeds:coordinates].reshape(-1, n), rest[coordinates:].reshape(-1, n))
 
 
-def _check_coefficients(module: Module, at: Numbers) -> None:
-    """Raise ArgumentError for friction and restitution that cannot be, as `params` may give them."""
-    faults = []
+def _check_coefficients(module: Module, at: Numbers, p: np.ndarray) -> None:
+    """Raise ArgumentError for friction, restitution and lengths that cannot be, as `params` may give them."""
+    values = dict(zip(module.metadata.parameters, p, strict=False))
+    lengths = {name: record.contact for record in module.metadata.contacts for name in record.lengths}
+    faults = [f"{name}, a length of contact {contact}, is {values[name]:g}; pass a number that is not negative"
+              for name, contact in lengths.items() if values.get(name, 0.0) < 0]
     for record, static, kinetic, e in zip(module.metadata.contacts, at.static, at.kinetic, at.restitution, strict=True):
         faults += [f"{what} of contact {record.name} is {value:g}; pass a number that is not negative" for what, value in
                    (("static friction", static), ("kinetic friction", kinetic), ("restitution", e)) if value < 0]
@@ -171,7 +174,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not, and for coefficients
     that parameters make impossible."""
     at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
-    _check_coefficients(module, at)
+    _check_coefficients(module, at, p)
     passed = ignored(module, t, x, p, inputs)
     counts = [record.kind != CLUTCH and not other for record, other in zip(records, passed, strict=True)]
     deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and counts[k]]
