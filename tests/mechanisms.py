@@ -169,3 +169,23 @@ def four_bar_linkage() -> sd.System:
     s.defaults = {g: 9.81, m: 1, l1: 0.8, l2: 1.8, l3: 1.6, d: 2}
     s.initial = {q1: 1, "q2": -0.5, q3: -2}
     return s
+
+
+def strange() -> sd.System:
+    """All operations, symbols whose names differ in capitals alone or are words of a language."""
+    q, Q = sd.coordinates("q Q")
+    m, M, e, block, fn, end = sd.parameters("m M e block fn end")
+    F = sd.inputs("F")
+    system = sd.System("strange", gravity=[0, -9.81])
+    a = system.add_body("a", mass=m, inertia=1)
+    b = system.add_body("b", mass=M, inertia=1, com=[0.3, 0])
+    system.add_joint(sd.Prismatic("slide", system.ground, a, q, axis=[1, 0]))
+    system.add_joint(sd.Revolute("turn", a, b, Q))
+    x = q / 4
+    unary = [sp.tan(x), sp.asin(x), sp.acos(x), sp.atan(x), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.asinh(x), sp.acosh(x + 3),
+             sp.atanh(x), sp.exp(x), sp.log(x + 3), sp.Abs(x), sp.sign(x), sp.floor(7 * x), sp.ceiling(7 * x), sp.erf(x),
+             sp.Min(x, Q), sp.Max(x, Q), sp.atan2(x, Q), (x + 3) ** sp.Rational(7, 3), sp.sqrt(x + 3), sp.Heaviside(x)]
+    several = sp.Piecewise((e, (x < Q) & (Q > 0)), (block, sp.Or(sp.Eq(x, Q), x >= Q)), (fn, sp.Ne(x, 1) & (x >= 0)), (end, True))
+    system.add_output("values", [*unary, several, F * sp.cos(sd.t)])
+    system.add_force(a, [F, 0])
+    return system.set_defaults({m: 1.0, M: 2.0, e: 0.5, block: 1.5, fn: 2.5, end: 3.5})

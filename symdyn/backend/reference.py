@@ -137,9 +137,9 @@ class _Point:
         results = []
         for name in whole if names is None else names:
             tape, singular = whole[name]
-            result = _result(name, tape, values, calls[name])
+            result = result_at(name, tape, values, calls[name])
             if result is None and singular is not None:
-                result = _result(name, singular, values, calls[name])
+                result = result_at(name, singular, values, calls[name])
             results.append(result)
         arrays = tuple((group, tuple(repr(float(values[name])) for name in self.groups[group])) for group in STATE_GROUPS)
         p = tuple(repr(float(self.parameters[name])) for name in self.groups["p"])
@@ -238,7 +238,7 @@ class _Search:
         return {name: np.concatenate([values, *[row[name] for row in extra]]) for name, values in points.items()}
 
 
-def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> ReferenceResult | None:
+def result_at(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> ReferenceResult | None:
     """A function at a state; None where it is not defined."""
     pivots = [n.args[1] if n.op == "guard" else n for n in tape.steps if n in tape.recorder.checks and n.op != "call"]
     checked = Tape(tape.recorder, {**tape.outputs, "": Output.of("", pivots)})

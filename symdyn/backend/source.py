@@ -136,12 +136,13 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     folders = template_folders(templates)
     known = backends(templates)
     if backend not in known:
-        raise SymdynError(f"there is no backend {shown(backend)}; there are {', '.join(known)}; "
+        instead = "a Modelica model is written by module.to_modelica; " if backend == "modelica" else ""
+        raise SymdynError(f"there is no backend {shown(backend)}; {instead}there are {', '.join(known)}; "
                           "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
     folder = next(f / backend for f in folders if (f / backend / "dialect.toml").is_file())
     dialect = read_dialect(folder)
     environment = _environment(*folders) if templates is not None else _shipped(*folders)
-    content = _with_violation(content)
+    content = with_violation(content)
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
@@ -214,7 +215,7 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
 _shipped = functools.cache(_environment)
 
 
-def _with_violation(content: Content) -> Content:
+def with_violation(content: Content) -> Content:
     """With corrections also the function `violation`, their residuals alone: a look whether a correction was enough."""
     if not all(n in content.tapes for n in CORRECTIONS):
         return content

@@ -188,7 +188,6 @@ class Writer:
             nodes = list(group)
             lines = self._read(nodes)
             for node in nodes:
-                named = node in self.names and node not in self.results
                 if node.op == "call":
                     lines += self._call(node)
                     continue
@@ -196,8 +195,7 @@ class Writer:
                     lines.append(self._guard(node))
                     continue
                 value = self.printer.operation(node)
-                inline = self.uses[node] <= 1 and not named and node not in self.checks and node not in self.guarded
-                if inline and (len(value) <= _INLINE_LENGTH if self.inlined is None else node in self.inlined):
+                if self._written_where_used(node, value):
                     self.text[node] = value
                     self.printer.inline.add(node)
                 else:
@@ -205,6 +203,12 @@ class Writer:
             if lines:
                 sections.append(Section(title, tuple(lines)))
         return sections
+
+    def _written_where_used(self, node: Node, value: str) -> bool:
+        """Whether a step gets no variable."""
+        named = node in self.names and node not in self.results
+        inline = self.uses[node] <= 1 and not named and node not in self.checks and node not in self.guarded
+        return inline and (len(value) <= _INLINE_LENGTH if self.inlined is None else node in self.inlined)
 
     def _guard(self, node: Node) -> str:
         """The statement that stops where the margin is not positive; the node is written as the value that it guards."""

@@ -89,8 +89,8 @@ def make_parser() -> argparse.ArgumentParser:
     _add_derive(formulation(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde, with "
                                     "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
-    exported = formulation(command("export", export, "write a mechanism for CasADi, JAX or PyTorch, or in Fortran, Julia, "
-                                 "MATLAB or Rust"))
+    exported = formulation(command("export", export, "write a mechanism for CasADi, JAX or PyTorch, in Fortran, Julia, "
+                                 "MATLAB, Rust or Modelica, as an FMU or a CMake package"))
     add_export(exported)
     _add_output(exported)
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))

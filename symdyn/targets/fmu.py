@@ -18,7 +18,7 @@ import jinja2
 import numpy as np
 
 import symdyn
-from symdyn.arguments import some, take
+from symdyn.arguments import some
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS, VIOLATION, Source, render
@@ -31,13 +31,11 @@ from symdyn.functions.content import content_of
 from symdyn.functions.tapes import all_columns_of, has_function
 from symdyn.runtime.building.compiler import Compiler, find_compiler, flags, link_flags, no_compiler_reason
 from symdyn.runtime.building.objects import run
-from symdyn.runtime.consistent import check_start
-from symdyn.runtime.integrating.simulate import start_of
-from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path, writing
-from symdyn.shown import name_of, shown
+from symdyn.shown import shown
 from symdyn.targets.fmu_description import units_of, unknowns_of, variables_of
+from symdyn.targets.start import equations_of, start_values
 from symdyn.targets.text import differentiable
 from symdyn.turning import turns
 
@@ -72,8 +70,8 @@ def write_fmu(module: Module, path: Any, version: int, kind: str, *, q: Any = No
     if not isinstance(kind, str) or kind not in KINDS:
         raise ArgumentError(f"{module.name}: an FMU of the kind {shown(kind)} asked for; take 'model_exchange' or "
                             "'co_simulation'")
-    start = _start(module, q, u, z, params, inputs)
-    equations, specialize = _equations(module)
+    start = start_values(module, "an FMU", q, u, z, params, inputs)
+    equations, specialize = equations_of(module, "an FMU")
     source, derivatives = source_of(equations, specialize)
     files = _files(module, source, version, kind, start, derivatives)
     compiler = find_compiler()
@@ -91,35 +89,6 @@ def write_fmu(module: Module, path: Any, version: int, kind: str, *, q: Any = No
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, content)
     return target
-
-
-def _start(module: Module, q: Any, u: Any, z: Any, params: Any, inputs: Any) -> dict[str, np.ndarray]:
-    """Values at the start. Raises ArgumentError for what an FMU cannot have: inputs in Python, rigid contacts."""
-    metadata = module.metadata
-    if metadata.contacts or metadata.contact_groups:
-        which = [*(c.name for c in metadata.contacts), *(g.name for g in metadata.contact_groups)][0]
-        raise ArgumentError(f"{module.name}: an FMU asked for, but the impacts and modes of the rigid contact {which} are found "
-                            "in Python, which an FMU does not have; give it law='compliant', whose forces are in the equations")
-    given = inputs if isinstance(inputs, Mapping) else {"inputs": inputs}
-    written = next(((name_of(key), value) for key, value in given.items() if callable(value) or hasattr(value, "period")), None)
-    if written:
-        raise ArgumentError(f"{module.name}: an FMU asked for with {written[0]} = {shown(written[1])}, a function in Python, "
-                            "which an FMU does not have; pass a number for the start and let the importer set the input, or put "
-                            "the function into the equations as an expression")
-    free = take(inputs, metadata.inputs, "inputs", metadata.initial_values("inputs"), module.name)
-    p = real_parameters(module, params)
-    x = start_of(module, q, u, z)
-    check_start(module.following(free), 0.0, x, p)
-    return {"x": x, "inputs": free, "p": p}
-
-
-def _equations(module: Module) -> tuple[Equations, Mapping[Any, float] | None]:
-    provider: Any = module._provider
-    if not hasattr(provider, "equations"):
-        raise ArgumentError(f"{module.name}: an FMU asked for of a module that was put together without equations; compile "
-                            "equations")
-    equations: Equations = provider.equations
-    return equations, provider.specialize
 
 
 def source_of(equations: Equations, specialize: Mapping[Any, float] | None) -> tuple[Source, tuple[str, ...]]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy as sp
 
 import symdyn as sd
 from symdyn.backend.dialect import Caseless, identifier
@@ -16,31 +15,12 @@ from symdyn.errors import UnsupportedExpression
 from symdyn.lab.languages import PROGRAMS, built, program_for
 from symdyn.lab.targets import compared
 from symdyn.pipeline import emit, write_source
+from tests.mechanisms import strange
 
 needed = {language: pytest.mark.skipif(program_for(language) is None, reason=f"there is no {program}")
           for language, program in PROGRAMS.items()}
 LANGUAGES = [pytest.param(language, marks=mark) for language, mark in needed.items()]
 WORDS = ("fortran", "julia", "matlab", "rust")
-
-
-def strange() -> sd.System:
-    """All operations, symbols whose names differ in capitals alone or are words of a language."""
-    q, Q = sd.coordinates("q Q")
-    m, M, e, block, fn, end = sd.parameters("m M e block fn end")
-    F = sd.inputs("F")
-    system = sd.System("strange", gravity=[0, -9.81])
-    a = system.add_body("a", mass=m, inertia=1)
-    b = system.add_body("b", mass=M, inertia=1, com=[0.3, 0])
-    system.add_joint(sd.Prismatic("slide", system.ground, a, q, axis=[1, 0]))
-    system.add_joint(sd.Revolute("turn", a, b, Q))
-    x = q / 4
-    unary = [sp.tan(x), sp.asin(x), sp.acos(x), sp.atan(x), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.asinh(x), sp.acosh(x + 3),
-             sp.atanh(x), sp.exp(x), sp.log(x + 3), sp.Abs(x), sp.sign(x), sp.floor(7 * x), sp.ceiling(7 * x), sp.erf(x),
-             sp.Min(x, Q), sp.Max(x, Q), sp.atan2(x, Q), (x + 3) ** sp.Rational(7, 3), sp.sqrt(x + 3), sp.Heaviside(x)]
-    several = sp.Piecewise((e, (x < Q) & (Q > 0)), (block, sp.Or(sp.Eq(x, Q), x >= Q)), (fn, sp.Ne(x, 1) & (x >= 0)), (end, True))
-    system.add_output("values", [*unary, several, F * sp.cos(sd.t)])
-    system.add_force(a, [F, 0])
-    return system.set_defaults({m: 1.0, M: 2.0, e: 0.5, block: 1.5, fn: 2.5, end: 3.5})
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
