@@ -11,8 +11,10 @@ from symdyn.urdf.document import Element, read_document
 from symdyn.urdf.values import FileFaults
 
 KIND = "an MJCF"
+# The keyframe that a written file has, with the initial values.
+START = "initial"
 # Elements that have no part in the dynamics; what refers to them goes with them.
-_IDLE = ("texture", "skin", "sensor", "visual", "statistic", "keyframe")
+_IDLE = ("texture", "skin", "sensor", "visual", "statistic")
 # Elements that name files, and the attributes of <compiler> with the folder that these are in.
 _FOLDERS = {"mesh": ("meshdir", "assetdir"), "hfield": ("meshdir", "assetdir")}
 # Includes in includes.

@@ -234,10 +234,10 @@ class Forces:
 
     def _command(self, i: int, name: str, dynamics: str) -> Any:
         """What the gain acts on: the input, or the state that follows it."""
-        u = inputs(self.tree.names.symbol(name))
+        u = self.tree.commands[i] = inputs(self.tree.names.symbol(name))
         if dynamics == "NONE":
             return u
-        state = coordinates(self.tree.names.symbol(f"act_{name}"))
+        state = self.tree.activations[i] = coordinates(self.tree.names.symbol(f"act_{name}"))
         rate = u if dynamics == "INTEGRATOR" else (u - state) / self.take("tau", name, float(self.m.actuator_dynprm[i, 0]))
         self.system.add_state(state, rate)
         return state

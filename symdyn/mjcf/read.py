@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
-from symdyn.kinds import flag
+from symdyn.kinds import flag, text
 from symdyn.mjcf.closures import Closures
 from symdyn.mjcf.compiled import Compiled
 from symdyn.mjcf.document import KIND
 from symdyn.mjcf.forces import Forces
 from symdyn.mjcf.left_out import LeftOut, examine
 from symdyn.mjcf.pictures import draw
+from symdyn.mjcf.start import set_start
 from symdyn.mjcf.tree import Tree
 from symdyn.model.system import System
 from symdyn.shown import shown
@@ -25,7 +26,8 @@ from symdyn.urdf.values import FileFaults, nearest
 
 
 def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | None = None, fixed: str | Sequence[str] = (),
-              leave_out: str | Sequence[str] = (), folder: str | Path | None = None, visuals: bool = False) -> System:
+              leave_out: str | Sequence[str] = (), folder: str | Path | None = None, visuals: bool = False,
+              keyframe: str | None = None) -> System:
     """The mechanism that a model of MuJoCo's describes: its bodies, joints, equality constraints, springs, tendons, actuators.
 
     path       of the file, or its text, which begins with "<"
@@ -39,6 +41,8 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
                the kinds "contacts", "limits", "friction", "ranges", "inactive" and "mocap", with * and ?
     folder     that no file of the model may be outside of; default: that of the file
     visuals    whether bodies look in pictures as the geoms of the groups 0 to 2, each with 800 triangles at most
+    keyframe   whose positions, speeds, activations and commands are the initial values, by its name; default: the one that
+               `to_mjcf` writes, "initial", where there is one
 
     MuJoCo's own compiler resolves default classes, frames, orientations and inertias of geoms. Coordinates are MuJoCo's: q_JOINT
     of hinges and slides, e0_ ... e3_JOINT of balls, and before these x_, y_, z_JOINT of free joints; so are the speeds, and the
@@ -61,6 +65,8 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     """
     wanted, held, without = patterns(symbolic, "symbolic"), patterns(fixed, "fixed"), patterns(leave_out, "leave_out")
     flag(visuals, "visuals")
+    if keyframe is not None:
+        text(keyframe, "keyframe", "home")
     written = isinstance(path, str) and path.lstrip("\ufeff \t\r\n").startswith("<")
     given = path.lstrip("\ufeff \t\r\n").encode() if isinstance(path, str) and written else None
     taken = Path("text") if written else as_path(path, KIND)
@@ -80,6 +86,7 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
     forces = Forces(tree, out)
     forces.build()
     Closures(tree, forces).build()
+    set_start(tree, keyframe)
     if visuals:
         draw(tree)
     system.set_defaults(tree.parameters.defaults)

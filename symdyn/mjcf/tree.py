@@ -39,6 +39,9 @@ class Tree:
         self.bodies: dict[int, Body] = {0: system.ground}
         self.joints: dict[int, Joint] = {}
         self.coordinates: dict[int, Coordinate] = {}
+        # Inputs and extra states of actuators, by their numbers.
+        self.commands: dict[int, Any] = {}
+        self.activations: dict[int, Any] = {}
 
     def build(self) -> None:
         # Coordinates have their names before the parameters.

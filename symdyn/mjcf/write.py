@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
-from symdyn.mjcf.document import KIND
+from symdyn.mjcf.document import KIND, START
 from symdyn.mjcf.equalities import Equalities
 from symdyn.mjcf.parts import Numbers, Scalar, pose_of, scalars_of
 from symdyn.model.joints import Fixed, Free, Joint, Prismatic, Revolute, Spherical
@@ -70,6 +70,10 @@ class _Writer:
         self.actuators: list[str] = []
         self.rotors: set[int] = set()
         self.points: list[str] = []
+        # Of the keyframe, in MuJoCo's order, which is that of the text.
+        self.q_start: list[float] = []
+        self.u_start: list[float] = []
+        self.commands: list[str] = []
 
     def lines(self) -> Iterator[str]:
         model = self.model
@@ -93,7 +97,36 @@ class _Writer:
         for tag, listed in (("tendon", self.tendons), ("equality", closing), ("actuator", self.actuators)):
             if listed:
                 yield from (f"  <{tag}>", *(f"    {line}" for line in listed), f"  </{tag}>")
+        if self.model.initial:
+            yield from ("  <keyframe>", f"    {self._keyframe()}", "  </keyframe>")
         yield "</mujoco>"
+
+    # -- the start
+
+    def _keyframe(self) -> str:
+        given = {symbol.name: value for symbol, value in self.model.initial.items()}
+        ctrl = [given.get(name, 0.0) for name in self.commands]
+        listed = [("qpos", self.q_start), ("qvel", self.u_start), ("ctrl", ctrl)]
+        texts = [f' {what}="{self.numbers.texts(values)}"' for what, values in listed if values]
+        return f'<key name="{START}"{"".join(texts)}/>'
+
+    def _starts(self, joint: Joint, symbols: Sequence[Any], speeds: Sequence[Any]) -> None:
+        """Note what a joint starts with; a coordinate may be an expression of others, whose rate follows from theirs."""
+        model = self.model
+        rates = [q.dot for q in model.coordinates if isinstance(q, Coordinate)]
+        values = {**self.numbers.values, **dict.fromkeys([*model.coordinates, *rates, *model.speeds], sp.S.Zero),
+                  **{symbol: sp.Float(value) for symbol, value in model.initial.items()}}
+        if len(symbols) != len(speeds):  # a quaternion, perhaps after a position
+            self.q_start += [float(values[q]) for q in symbols]
+            self.u_start += [float(values[u]) for u in speeds]
+            return
+        for q, u in zip(symbols, speeds, strict=True):
+            rate = sum((sp.sympify(q).diff(s) * s.dot for s in symbols_of(q) if isinstance(s, Coordinate)), sp.S.Zero)
+            self.q_start.append(float(sp.sympify(q).xreplace(values)))
+            self.u_start.append(float(rate.xreplace(values)))
+            if u is not None and u != rate and values.get(u):
+                self.faults.append(f"joint {shown(joint.name)} starts with the speed {u}, which is not the rate of a coordinate; "
+                                   "MJCF has rates: leave it out of the initial values")
 
     def _expressible(self) -> None:
         model = self.model
@@ -219,10 +252,12 @@ class _Writer:
         parts = [s for s in self.scalars.values() if self.model.joints[s.joint] is joint]
         if parts:
             for s in parts:
+                self._starts(joint, [s.coordinate], [s.speed])
                 more = self._attributes(s.name)
                 yield (f'<joint name={quoteattr(s.name)} type="{s.kind}" pos="{self.numbers.texts(anchor)}" '
                        f'axis="{self.numbers.texts(R @ s.axis)}"{more}/>')
             return
+        self._starts(joint, joint.coordinates, joint_speeds(joint))
         if isinstance(joint, Free):
             still = np.abs(whole.R - np.eye(3)).max() + np.abs(whole.p).max()
             if still > 0 or self.model.parents[self.model.joints.index(joint)] != -1:
@@ -333,6 +368,7 @@ class _Writer:
         if any(f"name={quoteattr(name)}" in line for line in self.actuators):
             self.faults.append(f"the input {name} drives several joints or loads; MJCF has an actuator for each: give each an "
                                f"input")
+        self.commands.append(name)
         self.actuators.append(f'<motor name={quoteattr(name)} {target} gear="{gear}"/>')
 
     def _site(self, body: Any, point: Any, R: Any = None) -> str:

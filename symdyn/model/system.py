@@ -683,8 +683,8 @@ class System:
         their coordinate, speed and inputs, springs and dampers between points, and forces between points become stiffness,
         damping,
         tendons and motors. Bodies without mass between joints vanish; a body on the ground that another joint's coordinate moves
-        is its armature. Outputs, shapes and initial values have no part in it. Coordinates have the same order and meaning; the
-        speeds, too, but those of Free joints with velocity="body". Returns the path.
+        is its armature. Initial values become the keyframe "initial"; outputs and shapes have no part in it. Coordinates have the
+        same order and meaning; the speeds, too, but those of Free joints with velocity="body". Returns the path.
 
         Raises ModelError with all faults: of the description, what MJCF has no words for, moving bodies that MuJoCo rejects,
         parameters without a number, and a file that cannot be written; ArgumentError for a path that is none.

@@ -10,6 +10,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
+from symdyn.model.record import joint_speeds
 from tests.mjcf.texts import BALL, CLOSED
 
 pytest.importorskip("mujoco", reason="mujoco is not installed; run: pip install 'symdyn[mjcf]'")
@@ -61,7 +62,9 @@ def geared() -> sd.System:
 
 @pytest.mark.parametrize(("make", "constraints"), [
     (every_joint, 0), (closed, 11), (geared, 2), (lambda: sd.systems.get("four_bar"), 3),
-    (lambda: sd.systems.get("stewart_platform"), 18)], ids=["every", "closed", "geared", "four_bar", "stewart"])
+    (lambda: sd.systems.get("n_four_bar"), 6), (lambda: sd.systems.get("bricard"), 6),
+    (lambda: sd.systems.get("stewart_platform"), 18)],
+    ids=["every", "closed", "geared", "four_bar", "n_four_bar", "bricard", "stewart"])
 def test_mujoco_accelerates_alike(tmp_path: Path, make: Callable[[], sd.System], constraints: int) -> None:
     from symdyn.lab.robots.mujoco_sweep import measure_system
 
@@ -80,6 +83,59 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     again = sd.read_mjcf(two.to_mjcf(tmp_path / "again.xml"))
     for a, b in zip(second.bodies, again.check().bodies, strict=True):
         np.testing.assert_allclose(np.array(a.inertia, dtype=float), np.array(b.inertia, dtype=float), rtol=0, atol=1e-16)
+
+
+def started(system: sd.System) -> dict[str, list[float]]:
+    model = system.check()
+    return {j.name: [float(model.initial.get(s, 0.0)) for s in (*j.coordinates, *joint_speeds(j))] for j in model.joints}
+
+
+@pytest.mark.parametrize("make", [lambda: sd.systems.get("n_four_bar"), lambda: sd.systems.get("stewart_platform"), every_joint])
+def test_initial_values_are_read_back(tmp_path: Path, make: Callable[[], sd.System]) -> None:
+    one = make()
+    if make is every_joint:
+        model = one.check()
+        one.initial = {s: 0.1 * (k + 1) for k, s in enumerate([*model.coordinates[:6], *model.inputs])}
+        one.initial |= {q.dot: 0.5 for q in model.coordinates[:6]}
+        turned = next(j for j in model.joints if j.name == "fly").coordinates
+        one.initial |= dict(zip(turned, [1.0, 2.0, 3.0, 0.5, 0.5, -0.5, 0.5]))
+    two = sd.read_mjcf(one.to_mjcf(tmp_path / "out.xml"))
+    first, second = started(one), started(two)
+    for name in first:
+        if name in second:
+            np.testing.assert_allclose(second[name], first[name], rtol=1e-15)
+    assert sum(name in second for name in first) >= len(first) - 8
+    given = {str(s): v for s, v in two.initial.items()}
+    assert all(given[str(s)] == v for s, v in one.check().initial.items() if s in one.check().inputs)
+
+
+def test_loops_that_are_read_back_start_closed(tmp_path: Path) -> None:
+    two = sd.read_mjcf(sd.systems.get("four_bar").to_mjcf(tmp_path / "out.xml"))
+    assert two.compile("numpy").simulate((0, 0.01)).t[-1] == 0.01
+
+
+def test_a_keyframe_is_chosen_by_its_name(tmp_path: Path) -> None:
+    text = """<mujoco><worldbody><body name="bar"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body>
+      </worldbody><actuator><general name="lag" joint="hinge" dyntype="filter" dynprm="0.2"/></actuator>
+      <keyframe><key name="home" qpos="0.5" qvel="2" act="0.25" ctrl="3"/><key qpos="9"/></keyframe></mujoco>"""
+    home = sd.read_mjcf(text, keyframe="home")
+    assert {str(s): v for s, v in home.initial.items()} == {"q_hinge": 0.5, "q_hinge_dot": 2.0, "act_lag": 0.25, "lag": 3.0}
+    assert not sd.read_mjcf(text).initial
+    with pytest.raises(ModelError, match="keyframe is 'hone', which the file does not have; there are home; did you mean 'home'"):
+        sd.read_mjcf(text, keyframe="hone")
+    with pytest.raises(ArgumentError, match="keyframe is 3; pass text"):
+        sd.read_mjcf(text, keyframe=3)
+
+
+def test_speeds_that_are_no_rates_are_not_started_with(tmp_path: Path) -> None:
+    system = sd.System("top", gravity=[0, 0, -9.81])
+    body = system.add_body("top", 1, [1, 2, 3], [0, 0, 1])
+    w = sd.coordinates("w1 w2 w3")
+    joint = system.add_joint(sd.Spherical("tip", system.ground, body, orientation=sd.EulerAngles("ZYX", speeds="body"), speeds=w))
+    system.initial = {w[0]: 1.0}
+    with pytest.raises(ModelError, match="joint 'tip' starts with the speed w1, which is not the rate of a coordinate"):
+        system.to_mjcf(tmp_path / "top.xml")
+    assert joint.name == "tip"
 
 
 def test_point_masses_get_some_inertia(tmp_path: Path) -> None:

@@ -15,6 +15,9 @@ from symdyn.model.record import Model, joint_speeds
 
 # Of Newton's method for states that fulfil the constraints, m or rad.
 _CLOSED, _STEPS = 1e-14, 60
+# Singular values of rows below the first part of the largest are those of rows that depend on others everywhere; at states with
+# some below the second part, constraints nearly depend on each other.
+_DEPENDENT, _NEARLY = 1e-10, 1e-5
 
 
 class MujocoRobot:
@@ -82,6 +85,19 @@ class MujocoRobot:
                 at += 3 * (kind == "free")
                 e = rng.normal(size=4)
                 d.qpos[at:at + 4] = e / np.linalg.norm(e)
+        self._moving(rng)
+
+    def near_start(self, rng: np.random.Generator) -> None:
+        """Positions up to 0.1 from those of the first keyframe, or from where the file has them; speeds and commands up to 1."""
+        m, d = self.m, self.d
+        self.mj.mj_resetData(m, d)
+        if m.nkey:
+            d.qpos[:] = m.key_qpos[0]
+        self.mj.mj_integratePos(m, d.qpos, rng.uniform(-0.1, 0.1, m.nv), 1.0)
+        self._moving(rng)
+
+    def _moving(self, rng: np.random.Generator) -> None:
+        m, d = self.m, self.d
         d.qvel[:] = rng.uniform(-1, 1, m.nv)
         d.ctrl[:] = rng.uniform(-1, 1, m.nu)
         d.act[:] = rng.uniform(-1, 1, m.na)
@@ -189,6 +205,11 @@ class MujocoRobot:
             self.mj.mj_integratePos(self.m, self.d.qpos, step / max(1.0, 2 * float(np.abs(step).max())), 1.0)
         self.d.qvel[:] -= np.linalg.lstsq(J, J @ self.d.qvel, rcond=1e-9)[0]
         return size
+
+    def singular(self) -> bool:
+        """Whether constraints depend on each other here that do not everywhere: accelerations are hardly determined then."""
+        sizes = np.linalg.svd(self.constraints()[1], compute_uv=False)
+        return bool(((sizes > _DEPENDENT * sizes[0]) & (sizes < _NEARLY * sizes[0])).any())
 
     def constrained(self) -> np.ndarray:
         """(n_v,) accelerations by M a + J^T lambda = M a_free, J a = -J_dot v."""

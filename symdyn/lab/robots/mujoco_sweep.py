@@ -21,6 +21,8 @@ from symdyn.urdf.values import FileFaults
 AGREEMENT = 1e-12
 # Random states of each model.
 STATES = 5
+# How often a state is drawn that has to fulfil constraints, anywhere and then near the start, and how well it has to, m or rad.
+TRIES, CLOSED = 20, 1e-9
 
 
 @dataclass
@@ -86,10 +88,8 @@ def measure_system(system: System, path: Path, folder: Path, states: int = STATE
     row.mass = peer.weights() if weights else 0.0
     rng = np.random.default_rng(seed)
     for _ in range(states):
-        peer.random(rng)
         closed = bool(system.loops or system.constraints)
-        if closed and peer.close() > 1e-9:
-            raise SymdynError("no state that fulfils the constraints was found")
+        _draw(peer, rng, closed)
         wanted = peer.constrained() if closed else peer.free()
         row.constraints = len(peer.constraints()[0]) if closed else 0
         M = peer.mass_matrix()
@@ -101,6 +101,16 @@ def measure_system(system: System, path: Path, folder: Path, states: int = STATE
         row.ud = max(row.ud, _apart(found[n_q:n_q + n_u], wanted[peer.u_at]))
         row.condition = max(row.condition, float(np.linalg.cond(M)))
     return row
+
+
+def _draw(peer: MujocoRobot, rng: np.random.Generator, closed: bool) -> None:
+    """A random state, with constraints one that fulfils them and is not singular. Raises SymdynError where there is none."""
+    for draw in (peer.random, peer.near_start):
+        for _ in range(TRIES):
+            draw(rng)
+            if not closed or (peer.close() < CLOSED and not peer.singular()):
+                return
+    raise SymdynError("no regular state that fulfils the constraints was found")
 
 
 def run(paths: Sequence[str | Path], folder: str | Path | None = None, states: int = STATES) -> int:
