@@ -22,7 +22,7 @@ from sympy.physics.mechanics import (
 import symdyn as sd
 from symdyn.lab.sympy_models import EXAMPLES, Example
 from symdyn.lab.sympy_models.chains import conical_pendulum, pendulum_on_cart
-from symdyn.lab.sympy_models.measure import lambdified, random_states, taken
+from symdyn.lab.sympy_models.measure import differentiated, lambdified, random_states, taken
 
 BY_NAME = {example.name: example for example in EXAMPLES}
 QUICK = [example for example in EXAMPLES if not example.slow and example.name != "pendulum_on_cart(10)"]
@@ -36,6 +36,18 @@ def test_right_hand_sides_are_those_of_sympys_matrices(example: Example) -> None
     for x, inputs in random_states(example, equations, 20):
         expected = compared(x, inputs)
         assert np.abs(module.rhs(0.0, x, inputs=inputs)[:len(expected)] - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("example", [e for e in QUICK if e.name not in ("rattleback", "astrobee")], ids=lambda e: e.name)
+def test_derivatives_are_those_of_sympys_matrices(example: Example) -> None:
+    derived = example.make()
+    equations = taken(example, derived)
+    module, compared = equations.compile("numpy"), differentiated(derived, equations)
+    for x, inputs in random_states(example, equations, 5):
+        expected = compared(x, inputs)
+        found = module.jacobian(0.0, x, inputs=inputs).x[:len(expected)]
+        assert found.shape[1] == expected.shape[1]
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
 def linear(example: Example) -> tuple[np.ndarray, np.ndarray]:
