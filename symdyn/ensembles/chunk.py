@@ -24,6 +24,8 @@ from symdyn.shown import shown
 GROUPS = ("q", "u", "z", "parameters", "inputs")
 # Longer messages of failed members are cut.
 MESSAGE = 400
+# Members whose doubts are listed.
+LISTED = 3
 # Numbers of motions that are held at a time, 8 bytes each.
 NUMBERS = 2**21
 
@@ -69,11 +71,17 @@ class Chunk:
 
 @dataclass
 class Done:
-    """Outcomes of a chunk: label -> (n, ...), not a number for members that failed; (place in the chunk, message) of these."""
+    """Outcomes of a chunk: label -> (n, ...), not a number for members that failed; (place in the chunk, message) of these.
+
+    doubts   (number of the member, what its motion was warned of) where outcomes are derivatives, the first few; n_doubtful: how
+             many members there are
+    """
 
     index: int
     columns: dict[str, np.ndarray]
     failures: list[tuple[int, str]] = field(default_factory=list)
+    doubts: list[tuple[int, str]] = field(default_factory=list)
+    n_doubtful: int = 0
 
     def fail(self, place: int, error: Exception) -> None:
         """Note a failed member, and leave its row empty."""
@@ -99,14 +107,19 @@ def run_chunk(chunk: Chunk) -> Done:
         if wrong:
             done.fail(k, MemberFailed(f"{', '.join(wrong)}: the outcome is not finite"))
     done.failures.sort()
+    done.doubts = [(chunk.first + k, text) for k, text in done.doubts]
     return done
 
 
 def _one_by_one(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Done) -> None:
     """Simulate samples, by their places, one after the other."""
+    differentiated = any(measure.grad for measure in setting.measures)
     for k in rows.tolist():
         try:
             solution = motion(setting, values[k])
+            if differentiated and solution.doubts:
+                done.n_doubtful += 1
+                done.doubts += [(k, solution.doubts[0])] * (len(done.doubts) < LISTED)
             for measure, shape in zip(setting.measures, setting.shapes, strict=True):
                 done.columns[measure.label][k] = _fitting(measure, measure.of(solution), shape)
         except Exception as error:  # whatever it is, it is this member's

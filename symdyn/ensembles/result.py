@@ -30,7 +30,8 @@ class Ensemble:
     names      what was sampled, of which `varied` is not the same in all;  labels: outcomes, `traces` those over the times t;
                shapes: of one member's outcomes; sensitivities: what derivatives among them are by, in this order
     count      number of members;  n_failed: how many of them have no outcome
-    n_resumed  how many had been computed before;  seconds: wall time of the others
+    n_resumed  how many had been computed before;  seconds: wall time of the others;  doubts: what was warned of in those of
+               them whose derivatives are outcomes, "" without
 
     >>> import tempfile
     >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -39,9 +40,9 @@ class Ensemble:
     (2, ('end q1',))
     """
 
-    def __init__(self, path: Path, n_resumed: int = 0, seconds: float = 0.0) -> None:
+    def __init__(self, path: Path, n_resumed: int = 0, seconds: float = 0.0, doubts: str = "") -> None:
         self.path, self.file = path, path / RESULT
-        self.n_resumed, self.seconds = n_resumed, seconds
+        self.n_resumed, self.seconds, self.doubts = n_resumed, seconds, doubts
         with reading(self.file) as archive:
             about = json.loads(str(archive["about"]))
             self.t: np.ndarray = archive["t"]

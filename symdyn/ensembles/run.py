@@ -7,6 +7,7 @@ import os
 import shutil
 import tempfile
 import time as clock
+import warnings
 import weakref
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.ensembles.chunk import Chunk, Setting, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.chunk import LISTED, Chunk, Setting, motion, quiet, setting_of, vectors_serve
 from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
 from symdyn.ensembles.lock import OneRun
@@ -25,7 +26,7 @@ from symdyn.ensembles.portable import PortableModule, of_contacts
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
-from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped
+from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped, SimulationWarning
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.runtime.batches.states import UNIT
@@ -86,9 +87,10 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
                 default: what is sampled
 
     From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
-    that fails has no numbers in its row, and is listed in `failures`; warnings of single motions are not given. Returns an
-    Ensemble. Raises ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an
-    executor died or the disk is full: what was done is kept, if there is a path.
+    that fails has no numbers in its row, and is listed in `failures`. Warnings of single motions are not given, but one
+    SimulationWarning tells of members whose derivatives are outcomes and were warned of. Returns an Ensemble. Raises
+    ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an executor died or
+    the disk is full: what was done is kept, if there is a path.
 
     >>> import tempfile
     >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -123,14 +125,21 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
         if not isinstance(path, (str, Path)) or "\0" in str(path):
             raise ArgumentError(f"{module.name}: the path is {shown(path)}; pass that of a folder, as text or a Path")
         with OneRun(Path(path)):
-            return _in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True)
+            return _told(_in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True))
     folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
     try:
-        result = _in_folder(folder, setting, drawn, executor, size, ahead, False, progress, False)
+        result = _told(_in_folder(folder, setting, drawn, executor, size, ahead, False, progress, False))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)
+    return result
+
+
+def _told(result: Ensemble) -> Ensemble:
+    """The same, after a warning of what is doubtful in it."""
+    if result.doubts:
+        warnings.warn(f"{result.name}: {result.doubts}", SimulationWarning, stacklevel=3)
     return result
 
 
@@ -173,6 +182,7 @@ class _Run:
         self.store, self.setting, self.samples = store, setting, samples
         self.executor, self.outstanding, self.progress, self.lasting = executor, outstanding, progress, lasting
         self.n_done = 0
+        self.n_doubtful, self.doubts = 0, list[tuple[int, str]]()
 
     def go(self) -> Ensemble:
         begun, store = clock.perf_counter(), self.store
@@ -188,6 +198,8 @@ class _Run:
             for done in arriving:
                 self.kept(lambda done=done: store.put(done))  # type: ignore[misc]
                 self.n_done += store.samples_in(done.index)
+                self.n_doubtful += done.n_doubtful
+                self.doubts = sorted([*self.doubts, *done.doubts])[:LISTED]
                 if bar is not None:
                     bar.update(store.samples_in(done.index))
         except ExecutorFailed as error:
@@ -201,7 +213,7 @@ class _Run:
             if bar is not None:
                 bar.close()
         self.kept(lambda: store.finish(self._about(), self.setting.times, self.samples.block))
-        return Ensemble(store.folder, n_before, clock.perf_counter() - begun)
+        return Ensemble(store.folder, n_before, clock.perf_counter() - begun, self._doubts())
 
     def kept(self, write: Callable[[], Any]) -> Any:
         """Do what writes to the disk; if the disk rejects it, report what is there."""
@@ -214,6 +226,14 @@ class _Run:
     def _stopped(self, why: str) -> EnsembleStopped:
         return EnsembleStopped(f"{self.setting.system.module.name}: the ensemble stopped: {why}; {self._what_is_kept()}",
                                self.n_done, self.store.count)
+
+    def _doubts(self) -> str:
+        """What to warn of where derivatives of members are doubtful."""
+        if not self.doubts:
+            return ""
+        more = f"; and {self.n_doubtful - LISTED} more" if self.n_doubtful > LISTED else ""
+        listed = "; ".join(f"{k}: {text}" for k, text in self.doubts)
+        return f"derivatives of {self.n_doubtful} of {self.store.count} members are doubtful: {listed}{more}"
 
     def _what_is_kept(self) -> str:
         if not self.lasting:

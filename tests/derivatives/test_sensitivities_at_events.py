@@ -126,6 +126,57 @@ def test_jump_without_an_event() -> None:
         block(event=False).simulate((0, 1), sensitivities=["mu"])
 
 
+@cache
+def jumping(name: str, event: bool = False) -> Any:
+    """A mass on a spring with a force that jumps where no event looks for it."""
+    x = sd.coordinates("x")
+    k, gap, m = sd.parameters("k gap m")
+    law = {"sign": -gap * sp.sign(x.dot), "floor": sp.floor(3 * x + gap), "atan2": gap * sp.atan2(x.dot, x),
+           "edge": -2 * sp.Heaviside(x - gap)}
+    system = sd.System(f"jumps_{name}")
+    body = system.add_body("body", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, x, axis=[1, 0]))
+    system.add_joint_force(joint, -k * x + law[name])
+    if event:
+        system.add_event("edge", x - gap)
+    system.defaults, system.initial = {m: 1, k: 5, gap: 0.3}, {x: 1}
+    return system.compile()
+
+
+@pytest.mark.filterwarnings("ignore:.*nothing in this motion")
+@pytest.mark.parametrize("name", ["sign", "floor", "atan2", "edge"])
+def test_jumps_are_found_over_the_steps(name: str) -> None:
+    """With two rows, between which every surface is passed an even number of times."""
+    with pytest.warns(SimulationWarning, match="the right-hand side may jump where .* passes zero") as found:
+        run = jumping(name).simulate(np.array([0, 3.0]), rtol=1e-10, sensitivities=["k", "gap"])
+    assert sum("may jump" in doubt for doubt in run.doubts) == 1 and len(run.t) == 2
+    if name == "edge":  # the times of these jumps depend on it
+        assert any("nothing in this motion but jumps that no event looks for depends on gap" in str(w.message) for w in found)
+
+
+def test_batches_and_ensembles_tell_of_jumps() -> None:
+    """An event at the jump makes the derivatives those of differences, without a warning."""
+    values, t, h = {"k": [5.0, 5.1]}, np.array([0, 3.0]), 1e-4
+    by = ["k", "gap"]
+    with pytest.warns(SimulationWarning, match=r"of 2 motions 0: jumps_edge: .*may jump.*; 1: jumps_edge: .*; and 1 more"):
+        jumping("edge").simulate_batch(params=values, t=t, rtol=1e-10, sensitivities=by)
+    with pytest.warns(SimulationWarning, match="jumps_edge: derivatives of 2 of 2 members are doubtful: 0: jumps_edge: .*; 1: "):
+        found = sd.ensemble(jumping("edge"), values, t, ["grad end x"], rtol=1e-10, sensitivities=by)
+    assert "derivatives of 2 of 2" in found.doubts
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not sd.ensemble(jumping("edge"), values, t, ["end x"], rtol=1e-10).doubts
+        found = sd.ensemble(jumping("edge", True), values, t, ["grad end x"], rtol=1e-10, sensitivities=by)
+        batch = jumping("edge", True).simulate_batch(params=values, t=t, rtol=1e-10, sensitivities=by)
+        for k, value in enumerate(values["k"]):
+            at = {"k": value, "gap": 0.3}
+            sides = [[jumping("edge", True).simulate(t, params={**at, n: at[n] + way}, rtol=1e-12).x[-1, 0] for way in (-h, h)]
+                     for n in by]
+            difference = np.diff(sides).ravel() / (2 * h)
+            np.testing.assert_allclose(found["grad end x"][k], difference, atol=1e-6)
+            np.testing.assert_allclose(batch.sensitivity.of("x")[k, -1], difference, atol=1e-6)
+
+
 def test_steps_go_on_as_without_sensitivities() -> None:
     plain = ball().simulate((0, 3), rtol=1e-9)
     run = ball().simulate((0, 3), rtol=1e-9, sensitivities=["g"], sensitivity_control=False)

@@ -64,7 +64,7 @@ class BatchSolution:
     n_steps, n_rejected   (n,) steps of the integrator
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is
     seconds    what the integration took
-    sensitivity   of runs that were asked for it: derivatives by name, see BatchSensitivity
+    columns    derivatives, of runs that were asked for them, see `sensitivity`
     """
 
     metadata: ModuleMetadata
@@ -77,7 +77,18 @@ class BatchSolution:
     width: int = 1
     note: str = ""
     seconds: float = field(default=0.0, compare=False)
-    sensitivity: BatchSensitivity | None = None
+    columns: BatchSensitivity | None = None
+
+    @property
+    def sensitivity(self) -> BatchSensitivity:
+        """Derivatives of the states by what `simulate_batch` was asked for, by name, see BatchSensitivity.
+
+        Raises ArgumentError if it was not asked for any.
+        """
+        if self.columns is None:
+            raise ArgumentError(f"{self.metadata.name}: these motions have no sensitivities; pass simulate_batch(..., "
+                                "sensitivities=[...]) the parameters, inputs and initial values that they are by")
+        return self.columns
 
     @property
     def q(self) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -120,20 +120,21 @@ class Asked:
                                 f"other at the start, and to first order no position fulfils them when {held} changes alone: let "
                                 "other parameters follow from one, as expressions of it, or leave out what is redundant")
 
-    def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
+    def doubts(self, module: Module, request: Request, outcome: Outcome, steps: Callable[[], Outcome]) -> list[str]:
         """What to warn of: columns in which everything is zero all along, jumps that no event looks for, kinks that the motion
-        stays at."""
+        stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump."""
         if not self.names:
             return []
         x = outcome.x[:, :module.metadata.sizes.x]
-        return [*self._without_effect(module, request, outcome), *gathered(module, outcome),
-                *unseen_jumps(module, request, outcome), *staying(module, request, outcome.t, x)]
+        every = steps() if module.metadata.switches else outcome
+        return [*self._without_effect(module, request, outcome, every), *gathered(module, outcome),
+                *unseen_jumps(module, request, every), *staying(module, request, outcome.t, x)]
 
-    def _without_effect(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
+    def _without_effect(self, module: Module, request: Request, outcome: Outcome, every: Outcome) -> list[str]:
         n_x = module.metadata.sizes.x
-        rows = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x) if self.names else np.zeros((0, 0, n_x))
+        rows = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x)
         nothing = [name for k, name in enumerate(self.names) if len(rows) > 1 and not rows[:, k].any()]
-        moved = _moving_jumps(module, request, outcome, nothing)
+        moved = _moving_jumps(module, request, every, nothing)
         nothing = [name for name in nothing if name not in moved]
         found = [f"{module.name}: {name} moves a jump of the right-hand side, where {surface} passes zero, and nothing else "
                  "here: without an event there its sensitivity is zero, which is that between jumps; add an event, "

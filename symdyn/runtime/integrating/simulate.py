@@ -54,6 +54,8 @@ MOST_STEPS = 2**31 - 1
 LARGEST_RTOL = 0.1
 # Part of a run below which events are not sampled.
 FINEST = 1e-8
+# Numbers of a motion that is repeated with a row for every step.
+MOST_NUMBERS = 2**26
 # Steps of the trial run that Baumgarte's gain is chosen by.
 TRIAL_STEPS = 100
 
@@ -140,8 +142,11 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             whole = replace(whole, stabilization=stabilization_of(module, request, method, stabilization))
             outcome = integrate(module, whole, method, bar)
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
-        outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
+        known = replace(request, inputs=free)
+        of_columns = [] if outcome.interrupted else asked.doubts(
+            module, known, outcome, lambda: _steps(module, replace(whole, inputs=free), method, outcome.n_steps))
+        outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen]), *of_columns))
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
                             work, (request.rtol, float(request.atol.max(initial=0.0))), why,
                             partial(_repeated, module, replace(whole, inputs=free), method), asked)
@@ -151,12 +156,10 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
-        for doubt in asked.doubts(module, replace(request, inputs=free), outcome):
-            warnings.warn(doubt, SimulationWarning, stacklevel=3)
         if metadata.watches and len(solution.t):
             warn(module, solution.rows(WATCHES), "in this motion", 3)
         if metadata.charts:
-            warn_near_lock(module, replace(request, inputs=free), solution.t, solution.x,
+            warn_near_lock(module, known, solution.t, solution.x,
                            lambda part: integrate(module, part, method), 3)
         return solution
 
@@ -211,6 +214,16 @@ def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) 
                               f"{outcome.message}")
     rows = outcome.x[len(whole) - len(ahead):len(whole)]
     return rows if end >= begin else rows[::-1]
+
+
+def _steps(module: Module, request: Request, method: Any, n_steps: int) -> Outcome:
+    """The same motion with a row for every step; for one of so many steps that memory would not hold them, with evenly spaced
+    rows."""
+    room = MOST_NUMBERS // max(1, len(request.x0))
+    times = None if n_steps < room else np.linspace(*request.span, room)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # they have been given
+        return integrate(module, replace(request, times=times), method)
 
 
 def stabilization_of(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
