@@ -343,6 +343,53 @@ def test_what_has_no_effect() -> None:
     assert not run.sensitivity["m"].any() and run.sensitivity["l"].any()
 
 
+def common() -> Any:
+    """A double pendulum with a common factor of all masses, which cancels, and a force that acts for a while in between."""
+    a, b = sd.coordinates("a b")
+    factor, push = sd.parameters("factor push")
+    system = sd.System("common", gravity=[0, -9.81])
+    upper = system.add_body("upper", mass=factor, inertia=0.01 * factor, com=[0, -0.5])
+    lower = system.add_body("lower", mass=1.7 * factor, inertia=0.03 * factor, com=[0, -0.4])
+    system.add_joint(sd.Revolute("a", system.ground, upper, a))
+    system.add_joint(sd.Revolute("b", upper, lower, b, parent_point=[0, -1]))
+    system.add_joint_force("b", factor * push * sp.Max(0, (sd.t - 1) * (1.5 - sd.t)) ** 3)
+    system.defaults = {factor: 1.3, push: 0.1}
+    return system.compile()
+
+
+def test_what_cancels_has_no_effect() -> None:
+    """Rounding that unstable motions magnify to 1e-7 is told from sensitivities."""
+    with pytest.warns(SimulationWarning, match="depends on m, which cancels in its equations: the sensitivities are zero"):
+        run = pendulum().simulate((0, 3), [1.0], params={"l": 1.1}, sensitivities=["m"])
+    assert 0 < np.abs(run.sensitivity["m"]).max() < 1e-12
+    module, t = common(), np.array([0, 5.0])
+    with pytest.warns(SimulationWarning, match="nothing in this motion depends on factor, which cancels") as found:
+        run = module.simulate(t, [2.9, 0.4], rtol=1e-10, sensitivities=["factor", "push", "a(0)"])
+    assert len(found) == 1 and np.abs(run.sensitivity["factor"]).max() > 1e-11
+    # What acts where there are no rows has an effect.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = module.simulate(np.array([0, 3.0]), [0.1, 0.1], rtol=1e-10, sensitivities=["push"])
+    ends = [module.simulate(np.array([0, 3.0]), [0.1, 0.1], params={"push": value}, rtol=1e-13).x[-1] for value in (0.099, 0.101)]
+    np.testing.assert_allclose(run.sensitivity["push"][-1], (ends[1] - ends[0]) / 2e-3, rtol=1e-6)
+
+
+def test_what_may_have_an_effect_elsewhere_is_not_judged() -> None:
+    """A parameter that the equations cannot be evaluated without, and one that only an event contains."""
+    y = sd.coordinates("y")
+    level, root, e = sd.parameters("level root e")
+    system = sd.System("judged", gravity=[0, -9.81])
+    body = system.add_body("ball", mass=1)
+    joint = system.add_joint(sd.Prismatic("fall", system.ground, body, y, axis=[0, 1]))
+    system.add_joint_force(joint, 0.1 * sp.sqrt(1 - root) * y)
+    system.add_event("bounce", y - level, reset={y.dot: -e * y.dot})
+    system.defaults, system.initial = {level: 0.2, root: 0.9, e: 0.8}, {y: 1}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = system.compile().simulate(np.array([0, 0.6]), rtol=1e-10, sensitivities=["level", "root", "e"])
+    assert (np.abs(run.sensitivity.matrix[-1, 0]) > 1e-3).all()
+
+
 def test_steps_next_to_a_singular_configuration_are_warned_of() -> None:
     """A slider-crank of equal bars at its dead point: where steps land next to it the sensitivities lose digits."""
     module = sd.systems.get("slider_crank").augmented().compile()

@@ -6,6 +6,7 @@ import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from symdyn.runtime.constraints import holding
 from symdyn.runtime.integrating.at_kinks import staying
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
+from symdyn.runtime.integrating.without_effect import ROUNDING, unaffected
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -122,33 +124,50 @@ class Asked:
 
     def doubts(self, module: Module, request: Request, outcome: Outcome, steps: Callable[[], Outcome]) -> list[str]:
         """What to warn of: columns in which everything is zero all along, jumps that no event looks for, kinks that the motion
-        stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump."""
-        if not self.names:
+        stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump or not depend on
+        a parameter."""
+        if not self.names or len(outcome.x) < 2:
             return []
-        x = outcome.x[:, :module.metadata.sizes.x]
-        every = steps() if module.metadata.switches else outcome
-        return [*self._without_effect(module, request, outcome, every), *gathered(module, outcome),
-                *unseen_jumps(module, request, every), *staying(module, request, outcome.t, x)]
-
-    def _without_effect(self, module: Module, request: Request, outcome: Outcome, every: Outcome) -> list[str]:
-        n_x = module.metadata.sizes.x
-        rows = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x)
-        nothing = [name for k, name in enumerate(self.names) if len(rows) > 1 and not rows[:, k].any()]
-        moved = _moving_jumps(module, request, every, nothing)
-        nothing = [name for name in nothing if name not in moved]
+        n_x, known = module.metadata.sizes.x, cache(steps)
+        jumps = unseen_jumps(module, request, known()) if module.metadata.switches else []
+        but = f"{module.name}: nothing in this motion depends on"
+        columns = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x)
+        nothing = [name for k, name in enumerate(self.names) if not columns[:, k].any()]
+        moved = _moving_jumps(module, request, known(), nothing) if module.metadata.switches else {}
         found = [f"{module.name}: {name} moves a jump of the right-hand side, where {surface} passes zero, and nothing else "
                  "here: without an event there its sensitivity is zero, which is that between jumps; add an event, "
                  f"system.add_event(name, {surface})" for name, surface in moved.items()]
+        nothing = [name for name in nothing if name not in moved]
         if nothing:
-            found.append(f"{module.name}: nothing in this motion depends on {', '.join(nothing)}: the sensitivities are zero")
-        return found
+            found.append(f"{but} {', '.join(nothing)}: the sensitivities are zero")
+        cancel = self._cancelling(module, request, outcome, columns[0], known, [*nothing, *moved])
+        if cancel:
+            found.append(f"{but} {', '.join(cancel)}, which cancel{'s' if len(cancel) == 1 else ''} in its equations: the "
+                         "sensitivities are zero, and the numbers what is left of rounding")
+        return [*found, *gathered(module, outcome), *jumps, *staying(module, request, outcome.t, outcome.x[:, :n_x])]
+
+    def _cancelling(self, module: Module, request: Request, outcome: Outcome, start: np.ndarray, steps: Callable[[], Outcome],
+                    nothing: Sequence[str]) -> list[str]:
+        """Names without effect that have sensitivities, which are rounding; start: rows of the sensitivities at the start, where
+        those by what constraints contain are not zero."""
+        n_x = module.metadata.sizes.x
+        size = ROUNDING * np.abs(outcome.x[:, :n_x]).max(initial=0.0)
+        asked = [name for k, name in enumerate(self.names)
+                 if self.columns[k] and name not in nothing and (self.sizes[k] * np.abs(start[k]) <= size).all()]
+        if module.metadata.contacts:  # whose modes say which equations hold
+            return []
+        asked = unaffected(module, request, asked, outcome.t[[0, -1]], outcome.x[[0, -1], :n_x]) if asked else []
+        if not asked:
+            return []
+        run = steps()
+        return unaffected(module, request, asked, run.t, run.x[:, :n_x])
 
 
 def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Sequence[str]) -> dict[str, str]:
     """Those of some parameters and inputs that what passes zero at a jump depends on -> the first such surface that passes it."""
     metadata = module.metadata
     asked = [name for name in names if name in metadata.parameters or name in metadata.inputs]
-    if not metadata.switches or not asked:
+    if not asked:
         return {}
     t, x = outcome.t, outcome.x[:, :metadata.sizes.x]
     inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), len(metadata.inputs)))

@@ -1,0 +1,70 @@
+"""What a motion does not depend on although its name occurs: parameters that cancel, such as a factor of all masses.
+
+Rounding leaves something of terms that cancel, and unstable motions magnify it without bound, so that the size of a sensitivity
+does not tell. The equations do: with other values of the parameter they give the same at all states of the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+from symdyn.runtime.integrating.events import EVENTS, RESETS
+
+if TYPE_CHECKING:
+    from symdyn.runtime.integrating.outcome import Request
+    from symdyn.runtime.module import Module
+
+# Changes up to this part of the size of what changes are rounding: 1e4 of its units, 2.2e-12.
+ROUNDING = 1e4 * float(np.finfo(float).eps)
+# Entries that are no larger than this part of the largest of their kind are rounding themselves.
+NOTHING = 1e3 * float(np.finfo(float).eps)
+
+
+def unaffected(module: Module, request: Request, names: Sequence[str], t: np.ndarray, x: np.ndarray) -> list[str]:
+    """The parameters and constant inputs among names with which neither the right-hand side nor events and their resets change by
+    more than rounding, at rows x (n_t, n_x) of a motion at times t.
+
+    Each takes 1.5 times its value, and 1 more. What cannot be evaluated then is taken to depend on it.
+    """
+    metadata = module.metadata
+    inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), metadata.sizes.inputs))
+    groups = (metadata.sizes.q, metadata.sizes.u, metadata.sizes.x - metadata.sizes.q - metadata.sizes.u)
+    functions: list[tuple[str, tuple[int, ...]]] = [("rhs", groups)]
+    if request.look is not None and request.look.any():
+        functions += [(name, ()) for name in (EVENTS, RESETS) if name in metadata.functions]
+
+    def stays(name: str) -> bool:
+        for function, groups in functions:
+            here = module.evaluate(function, t, x, request.p, inputs)
+            size = ROUNDING * _sizes(here, groups)
+            for other in (lambda value: 1.5 * value, lambda value: value + 1.0):
+                p, given = request.p.copy(), inputs.copy()
+                if name in metadata.parameters:
+                    place = metadata.parameters.index(name)
+                    p[place] = other(p[place])
+                else:
+                    place = metadata.inputs.index(name)
+                    given[:, place] = other(given[:, place])
+                if not (np.abs(module.evaluate(function, t, x, p, given) - here) <= size).all():
+                    return False
+        return True
+
+    found = []
+    for name in names:
+        try:
+            found += [name] if stays(name) else []
+        except EvaluationError:
+            continue
+    return found
+
+
+def _sizes(values: np.ndarray, groups: Sequence[int]) -> np.ndarray:
+    """The largest values of every column, of what is nothing but rounding those of its group; groups: numbers of columns."""
+    own = np.abs(values).max(axis=0)
+    parts = np.split(own, np.cumsum(groups)[:-1]) if groups else [own[k:k + 1] for k in range(len(own))]
+    largest = np.concatenate([np.full(len(part), part.max(initial=0.0)) for part in parts])
+    return np.where(own > NOTHING * largest, own, largest)
