@@ -130,7 +130,7 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
         result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
     if shape.events:
         result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_NOTE", _NOTE + 2 * shape.n_x),
-                   ("SYMDYN_NOTES", _WAITING + 3 * len(shape.events))]
+                   ("SYMDYN_NOTES", _WAITING + 3 * len(shape.events) + 1)]
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))

@@ -17,7 +17,7 @@ from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.functions.sensitivities import shown_name
 from symdyn.runtime.inputs.inputs import not_finite
 from symdyn.runtime.integrating.chatter import STEPS, chatter_of
-from symdyn.runtime.integrating.events import CHATTER, Happened, at_once, ended, not_known, not_proved, too_quick
+from symdyn.runtime.integrating.events import CHATTER, Happened, at_once, ended, entangled, not_known, not_proved, too_quick
 from symdyn.runtime.integrating.interrupts import Interrupts
 from symdyn.runtime.integrating.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -38,7 +38,7 @@ STEPS_AT_ONCE = 4096
 # configurations those whose sensitivities lost a hundred tolerances or more were moved by 4,000 to 6e8; regular runs by 12 at
 # most.
 FAR = 1000.0
-# Most events that wait to be taken, besides three of each kind; see `noted` in the generated source.
+# Most events that wait to be taken, besides three of each kind and one more; see `noted` in the generated source.
 _EVENTS_WAITING = 64
 
 
@@ -81,10 +81,11 @@ class Run:
         self.happened: list[Happened] = []
         self.too_quick: list[tuple[int, float]] = []
         self.hidden: list[tuple[int, float]] = []
+        self.entangled: list[tuple[int, float]] = []
         self.rows: np.ndarray | None = None
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
-            self.rows = np.zeros((_EVENTS_WAITING + 3 * len(self.look), 2 + 2 * self.n_x))
+            self.rows = np.zeros((_EVENTS_WAITING + 3 * len(self.look) + 1, 2 + 2 * self.n_x))
             unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
                                              ctypes.c_double(request.event_spacing))
             if request.carried is not None:
@@ -150,8 +151,8 @@ class Run:
             n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
             for k, t, *states in self.rows[:n]:
                 if k < 0:
-                    of = -1 - int(k)
-                    (self.too_quick if of < len(self.look) else self.hidden).append((of % len(self.look), float(t)))
+                    kind, of = divmod(-1 - int(k), len(self.look))
+                    (self.too_quick, self.hidden, self.entangled)[kind].append((of, float(t)))
                 else:
                     self.happened.append(Happened(int(k), float(t), *np.array(states).reshape(2, -1)))
         return status
@@ -250,7 +251,8 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     if over or not success:
         t, x = with_last(t, x, report.of.t, report.x)
     of = report.of
-    doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing)]
+    doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing),
+              entangled(module, run.happened, [t for _, t in run.entangled])]
     if status >= 0:
         doubts += [_doubt(module, request, method, of),
                    moved_far(module.name, of.largest_moved, of.t_moved, bool(request.columns))]

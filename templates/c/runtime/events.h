@@ -250,7 +250,7 @@ static int symdyn_event_unproved(
 #endif
 
 // Note event k, or, as -1 - k, that its zeros were not resolved, as -1 - SYMDYN_N_EVENTS - k, that it was not proved that they
-// are.
+// are, as -1 - 2 SYMDYN_N_EVENTS - k, that the columns depend on the order of events at one time.
 static void symdyn_event_note(symdyn_run *run, int k, double t, const double *before, const double *after) {
     double *const note = run->events.noted + SYMDYN_NOTE * run->events.n_noted++;
     note[0] = k;
@@ -283,58 +283,6 @@ static int symdyn_slope_beside(symdyn_run *run, double t, const double *x, doubl
     return 0;
 }
 
-// The columns of sensitivities after the events at (t, x), behind the state after them: an event comes earlier by what its
-// quantity is moved by over its rate. (Saltation: Hiskens and Pai, Trajectory sensitivity analysis of hybrid systems, 2000.)
-// changed: whether they differ from those before. Returns 0 or a failure.
-static int symdyn_event_columns(symdyn_run *run, double t, const double *x, double *after, int *changed) {
-    enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
-    double slope[SYMDYN_NX], then[SYMDYN_NX], y[SYMDYN_NX], later[SYMDYN_COLUMNS];
-    double g[3][SYMDYN_N_EVENTS * WIDTH];
-    int failure, first = -1, reason = 0, same = 1;
-    for (int k = SYMDYN_N_EVENTS - 1; k >= 0; k--)
-        if (run->events.fired[k] && (first < 0 || symdyn_event[k].resets)) first = k;
-    *changed = 0;
-    if ((failure = symdyn_slope_beside(run, t, x, -1.0, slope))) return failure;
-    for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? after[i] : x[i];
-    if ((failure = symdyn_slope_beside(run, t, y, 1.0, then))) return failure;
-    for (int i = 0; i < N; i++) same &= after[i] == x[i] && fabs(then[i] - slope[i]) <= 1e-8 * (fabs(then[i]) + fabs(slope[i]));
-    if (same) return 0;
-    // Along the columns; along none, and along the motion in place of the first: their difference is the rate at a fixed time.
-    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i];
-    for (int way = 0; way < 3 && !reason; way++) {
-        for (int i = N; i < SYMDYN_NX; i++) y[i] = way == 0 ? x[i] : way == 2 && i < 2 * N ? slope[i - N] : 0.0;
-        reason = symdyn_event_columns_at(&run->problem, t, y, g[way]);
-    }
-    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
-    const double rate = g[0][first * WIDTH] + (g[2][first * WIDTH + 1] - g[1][first * WIDTH + 1]);
-    for (int j = 0; j < SYMDYN_COLUMNS; j++) {
-        later[j] = -g[0][first * WIDTH + 1 + j] / rate;
-        for (int i = 0; i < N; i++) y[N * (j + 1) + i] = x[N * (j + 1) + i] + slope[i] * later[j];
-    }
-#if SYMDYN_HAS_RESETS
-    double becomes[SYMDYN_RESETS * WIDTH], columns[SYMDYN_NX];
-    if ((reason = symdyn_event_reset_columns_at(&run->problem, t, y, becomes)))
-        return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
-    for (int i = 0; i < SYMDYN_NX; i++) columns[i] = y[i];
-    for (int k = 0, r = 0; k < SYMDYN_N_EVENTS; k++)
-        for (int end = r + symdyn_event[k].resets; r < end; r++)
-            for (int j = 0; j < SYMDYN_COLUMNS && run->events.fired[k]; j++)
-                columns[N * (j + 1) + symdyn_reset_index[r]] = becomes[r * WIDTH + 1 + j] + becomes[r * WIDTH] * later[j];
-    for (int i = N; i < SYMDYN_NX; i++) y[i] = columns[i];
-#endif
-#if SYMDYN_KEEPS_RESETS
-    for (int i = 0; i < N; i++) y[i] = after[i];
-    if ((failure = symdyn_keep_columns(run, t, x, y, run->events.asked, then, later))) return failure;
-#endif
-    for (int j = 0; j < SYMDYN_COLUMNS; j++)
-        for (int i = 0; i < N; i++) after[N * (j + 1) + i] = y[N * (j + 1) + i] - then[i] * later[j];
-    *changed = 1;
-#if SYMDYN_PROJECTS
-    if (run->problem.project && symdyn_correct_columns(run, t, after))
-        return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, run->reason, -1, t, x);
-#endif
-    return 0;
-}
 #endif
 
 // The state after the resets of the events at (t, x), on the constraints, whatever keeps the steps there. Returns 0 or a failure.
@@ -373,6 +321,275 @@ static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double
     return 0;
 #endif
 }
+
+#if SYMDYN_SENSITIVE
+// By how much the events at (t, x) come later along each column, later[k][j], along a motion with this slope: by what the
+// quantity of event k is moved by, over its rate. Returns 0 or a failure.
+static int symdyn_event_later(symdyn_run *run, double t, const double *x, const double *slope, double (*later)[SYMDYN_COLUMNS]) {
+    enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
+    double y[SYMDYN_NX], g[3][SYMDYN_N_EVENTS * WIDTH];
+    int reason = 0;
+    // Along the columns; along none, and along the motion in place of the first: their difference is the rate at a fixed time.
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i];
+    for (int way = 0; way < 3 && !reason; way++) {
+        for (int i = N; i < SYMDYN_NX; i++) y[i] = way == 0 ? x[i] : way == 2 && i < 2 * N ? slope[i - N] : 0.0;
+        reason = symdyn_event_columns_at(&run->problem, t, y, g[way]);
+    }
+    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+        const double rate = g[0][k * WIDTH] + (g[2][k * WIDTH + 1] - g[1][k * WIDTH + 1]);
+        for (int j = 0; j < SYMDYN_COLUMNS; j++) later[k][j] = -g[0][k * WIDTH + 1 + j] / rate;
+    }
+    return 0;
+}
+
+// The columns after the events that fire at (t, x), at one time, behind the state after them; slope, then: those before and after
+// them. (Saltation: Hiskens and Pai, Trajectory sensitivity analysis of hybrid systems, 2000.) Returns 0 or a failure.
+static int symdyn_jump_columns(
+    symdyn_run *run, double t, const double *x, double *after, const double *slope, const double *then) {
+    enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
+    double y[SYMDYN_NX], all[SYMDYN_N_EVENTS][SYMDYN_COLUMNS];
+    int failure, first = -1;
+    for (int k = SYMDYN_N_EVENTS - 1; k >= 0; k--)
+        if (run->events.fired[k] && (first < 0 || symdyn_event[k].resets)) first = k;
+    if ((failure = symdyn_event_later(run, t, x, slope, all))) return failure;
+    const double *const later = all[first];
+    for (int i = 0; i < N; i++) y[i] = x[i];
+    for (int j = 0; j < SYMDYN_COLUMNS; j++)
+        for (int i = 0; i < N; i++) y[N * (j + 1) + i] = x[N * (j + 1) + i] + slope[i] * later[j];
+#if SYMDYN_HAS_RESETS
+    double becomes[SYMDYN_RESETS * WIDTH], columns[SYMDYN_NX];
+    const int reason = symdyn_event_reset_columns_at(&run->problem, t, y, becomes);
+    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    for (int i = 0; i < SYMDYN_NX; i++) columns[i] = y[i];
+    for (int k = 0, r = 0; k < SYMDYN_N_EVENTS; k++)
+        for (int end = r + symdyn_event[k].resets; r < end; r++)
+            for (int j = 0; j < SYMDYN_COLUMNS && run->events.fired[k]; j++)
+                columns[N * (j + 1) + symdyn_reset_index[r]] = becomes[r * WIDTH + 1 + j] + becomes[r * WIDTH] * later[j];
+    for (int i = N; i < SYMDYN_NX; i++) y[i] = columns[i];
+#endif
+#if SYMDYN_KEEPS_RESETS
+    for (int i = 0; i < N; i++) y[i] = after[i];
+    if (symdyn_event[first].resets && (failure = symdyn_keep_columns(run, t, x, y, run->events.asked, then, later))) return failure;
+#endif
+    for (int j = 0; j < SYMDYN_COLUMNS; j++)
+        for (int i = 0; i < N; i++) after[N * (j + 1) + i] = y[N * (j + 1) + i] - then[i] * later[j];
+#if SYMDYN_PROJECTS
+    if (run->problem.project && symdyn_correct_columns(run, t, after))
+        return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, run->reason, -1, t, x);
+#endif
+    return 0;
+}
+
+// The slope at (t, x) between events at one time, where quantities of some have gone over, 1 in `sides`, and those of others have
+// not yet, -1: as symdyn_slope_beside, along the nearest way from (t, x) to that side. clear: whether there is one. before: the
+// slope before all of them. Returns 0 or a failure.
+static int symdyn_slope_between(
+    symdyn_run *run, double t, const double *x, const int *sides, const double *before, double *slope, int *clear) {
+    enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
+    double y[SYMDYN_NX], far[SYMDYN_NX], none[SYMDYN_N_EVENTS * WIDTH], along[SYMDYN_N_EVENTS * WIDTH];
+    double g[SYMDYN_N_EVENTS][1 + SYMDYN_STATE], G[SYMDYN_N_EVENTS][SYMDYN_N_EVENTS], way[1 + SYMDYN_STATE];
+    int failure = symdyn_eval(run, t, x, slope), reason;
+    if (failure) return failure;
+    // Derivatives of the quantities by time and state.
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? x[i] : 0.0;
+    reason = symdyn_event_columns_at(&run->problem, t, y, none);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) g[k][0] = none[k * WIDTH];
+    for (int begin = 0; begin < N && !reason; begin += SYMDYN_COLUMNS) {
+        for (int j = 0; j < SYMDYN_COLUMNS; j++)
+            for (int i = 0; i < N; i++) y[N * (j + 1) + i] = i == begin + j;
+        reason = symdyn_event_columns_at(&run->problem, t, y, along);
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+            for (int j = 0; j < SYMDYN_COLUMNS && begin + j < N; j++)
+                g[k][1 + begin + j] = along[k * WIDTH + 1 + j] - none[k * WIDTH + 1 + j];
+    }
+    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    const double change = symdyn_square(run, slope, x), size = symdyn_square(run, x, x);
+    const double most = fmin(run->h_max, fabs(run->t_end - run->t_old)), there = change > 0.0 ? sqrt(size / change) : most;
+    const double step = 1e-6 * run->direction * fmax(fabs(run->h_old), fmin(there, most));
+    *clear = 1;
+    for (int times = 2; times > 0; times--)
+        for (int round = 0; round < 3; round++) {
+            double gap[SYMDYN_N_EVENTS];
+            int open[SYMDYN_N_EVENTS];
+            way[0] = 1.0;
+            for (int i = 0; i < N; i++) way[1 + i] = slope[i];
+            for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+                double rate = g[k][0], size_k = 0.0, now = g[k][0];
+                open[k] = sides[k] != 0;
+                for (int i = 0; i < N; i++) {
+                    rate += g[k][1 + i] * before[i];
+                    now += g[k][1 + i] * slope[i];
+                }
+                for (int i = 0; i <= N; i++) size_k = fmax(size_k, fabs(g[k][i]));
+                gap[k] = sides[k] < 0 ? -rate - now : 0.0;
+                for (int l = 0; l < SYMDYN_N_EVENTS; l++) {
+                    G[k][l] = 0.0;
+                    for (int i = 0; i <= N; i++) G[k][l] += g[k][i] * g[l][i];
+                }
+                open[k] &= size_k > 0.0;
+            }
+            // The least change of the way that makes up for the gaps, by elimination with the largest pivots.
+            int order[SYMDYN_N_EVENTS], n = 0;
+            for (int best = 0; best >= 0;) {
+                double largest = 1e-10;
+                best = -1;
+                for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+                    double own = 0.0;
+                    for (int i = 0; i <= N; i++) own += g[k][i] * g[k][i];
+                    if (open[k] && G[k][k] > largest * own) {
+                        largest = G[k][k] / own;
+                        best = k;
+                    }
+                }
+                if (best < 0) break;
+                open[best] = 0;
+                order[n++] = best;
+                for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+                    if (open[k]) {
+                        const double factor = G[k][best] / G[best][best];
+                        gap[k] -= factor * gap[best];
+                        for (int l = 0; l < SYMDYN_N_EVENTS; l++) G[k][l] -= factor * G[best][l];
+                    }
+            }
+            for (int k = 0; k < SYMDYN_N_EVENTS; k++) *clear &= !open[k];
+            for (int m = n - 1; m >= 0; m--) {
+                const int k = order[m];
+                for (int other = m + 1; other < n; other++) gap[k] -= G[k][order[other]] * gap[order[other]];
+                gap[k] /= G[k][k];
+                for (int i = 0; i <= N; i++) way[i] += gap[k] * g[k][i];
+            }
+            for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? x[i] + times * step * way[1 + i] : x[i];
+            if ((failure = symdyn_eval(run, t + times * step * way[0], y, slope))) return failure;
+            if (times == 2)
+                for (int i = 0; i < SYMDYN_NX; i++) far[i] = slope[i];
+        }
+    for (int i = 0; i < SYMDYN_NX; i++) slope[i] = 2.0 * slope[i] - far[i];
+    return 0;
+}
+
+// Whether a state or its slope jumps.
+static int symdyn_jumps(const double *x, const double *after, const double *slope, const double *then) {
+    int same = 1;
+    for (int i = 0; i < SYMDYN_STATE; i++)
+        same &= after[i] == x[i] && fabs(then[i] - slope[i]) <= 1e-8 * (fabs(then[i]) + fabs(slope[i]));
+    return !same;
+}
+
+// State and columns after events at (t, x) one after the other, each at its own time, in the order of their numbers in `order`;
+// slope: before all of them. clear: whether slopes between them are known. Returns 0 or a failure.
+static int symdyn_in_order(
+    symdyn_run *run, double t, const double *x, const int *order, int n, const double *slope, double *after, int *clear) {
+    double now[SYMDYN_NX], at[SYMDYN_NX], then[SYMDYN_NX];
+    int failure, sides[SYMDYN_N_EVENTS] = {0};
+    for (int m = 0; m < n; m++) sides[order[m]] = -1;
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        at[i] = slope[i];
+        now[i] = x[i];
+    }
+    *clear = 1;
+    for (int m = 0; m < n; m++) {
+        int known = 1;
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.fired[k] = k == order[m];
+        sides[order[m]] = 1;
+        for (int i = 0; i < SYMDYN_NX; i++) after[i] = now[i];
+        if (symdyn_event[order[m]].resets && (failure = symdyn_event_reset(run, t, now, after))) return failure;
+        failure = m == n - 1 ? symdyn_slope_beside(run, t, after, 1.0, then)
+                             : symdyn_slope_between(run, t, after, sides, slope, then, &known);
+        if (failure) return failure;
+        *clear &= known;
+        if (symdyn_jumps(now, after, at, then) && (failure = symdyn_jump_columns(run, t, now, after, at, then))) return failure;
+        for (int i = 0; i < SYMDYN_NX; i++) {
+            at[i] = then[i];
+            now[i] = after[i];
+        }
+    }
+    return 0;
+}
+
+// The same as symdyn_jump_columns where several events fire, n of them, which have an effect: columns along which they come at
+// different times are those of one event after the other, if the result is the same in any order; else they are those of one time,
+// and `ordered` is 0. Orders that are compared: by number, the reverse, and with two neighbours exchanged. Returns 0 or a failure.
+static int symdyn_several_columns(symdyn_run *run, double t, const double *x, double *after, const double *slope,
+                                  const double *then, const int *events, int n, int *ordered) {
+    enum { N = SYMDYN_STATE };
+    double later[SYMDYN_N_EVENTS][SYMDYN_COLUMNS], one[SYMDYN_NX], other[SYMDYN_NX];
+    int failure, apart[SYMDYN_COLUMNS], any = 0, agree[SYMDYN_COLUMNS], clear;
+    double fastest = 0.0;
+    if ((failure = symdyn_event_later(run, t, x, slope, later))) return failure;
+    for (int i = 0; i < N; i++) fastest = fmax(fastest, fabs(slope[i]));
+    for (int j = 0; j < SYMDYN_COLUMNS; j++) {
+        double size = 0.0;
+        for (int i = 0; i < N; i++) size = fmax(size, fabs(x[N * (j + 1) + i]));
+        apart[j] = 0;
+        for (int m = 1; m < n; m++) {
+            const double a = later[events[0]][j], b = later[events[m]][j];
+            apart[j] |= !(fabs(a - b) * fastest <= 1e-9 * fmax(fabs(a), fabs(b)) * fastest + 1e-12 * size);
+        }
+        any |= apart[j];
+        agree[j] = 1;
+    }
+    for (int i = 0; i < SYMDYN_NX; i++) one[i] = other[i] = x[i];
+    if ((failure = symdyn_jump_columns(run, t, x, after, slope, then)) || !any) return failure;
+    for (int way = 0; way < (n > 2 ? n + 1 : 2); way++) {
+        int order[SYMDYN_N_EVENTS];
+        double *const result = way ? other : one;
+        for (int m = 0; m < n; m++) order[m] = events[way == 1 ? n - 1 - m : m];
+        if (way > 1) {
+            order[way - 2] = events[way - 1];
+            order[way - 1] = events[way - 2];
+        }
+        failure = symdyn_in_order(run, t, x, order, n, slope, result, &clear);
+        for (int i = 0; i < N && !failure; i++) clear &= fabs(result[i] - after[i]) * symdyn_scale(run, i, after[i]) <= 1.0;
+        for (int j = 0; j < SYMDYN_COLUMNS; j++) {
+            double off = 0.0, size = 0.0;
+            for (int i = N * (j + 1); i < N * (j + 2) && !failure; i++) {
+                off = fmax(off, fabs(result[i] - one[i]));
+                size = fmax(size, fmax(fabs(result[i]), fabs(one[i])));
+            }
+            agree[j] &= !failure && clear && off <= 1e-7 * size;
+        }
+    }
+    for (int j = 0; j < SYMDYN_COLUMNS; j++) {
+        for (int i = N * (j + 1); i < N * (j + 2) && apart[j] && agree[j]; i++) after[i] = one[i];
+        *ordered &= !apart[j] || agree[j];
+    }
+    return 0;
+}
+
+// The columns of sensitivities after the events at (t, x), behind the state after them: each comes earlier by what its quantity is
+// moved by over its rate. changed: whether they differ from those before. Returns 0 or a failure.
+static int symdyn_event_columns(symdyn_run *run, double t, const double *x, double *after, int *changed) {
+    enum { N = SYMDYN_STATE };
+    double slope[SYMDYN_NX], then[SYMDYN_NX], y[SYMDYN_NX];
+    int failure, events[SYMDYN_N_EVENTS], all[SYMDYN_N_EVENTS], n = 0, n_fired = 0, ordered = 1;
+    *changed = 0;
+    if ((failure = symdyn_slope_beside(run, t, x, -1.0, slope))) return failure;
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? after[i] : x[i];
+    if ((failure = symdyn_slope_beside(run, t, y, 1.0, then))) return failure;
+    if (!symdyn_jumps(x, after, slope, then)) return 0;
+    *changed = 1;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) n_fired += all[k] = run->events.fired[k];
+    if (n_fired == 1) return symdyn_jump_columns(run, t, x, after, slope, then);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+        if (all[k]) {  // those that have an effect
+            int sides[SYMDYN_N_EVENTS], clear = 1;
+            for (int l = 0; l < SYMDYN_N_EVENTS; l++) sides[l] = all[l] ? l == k ? 1 : -1 : 0;
+            if (!symdyn_event[k].resets && (failure = symdyn_slope_between(run, t, x, sides, slope, y, &clear))) return failure;
+            if (symdyn_event[k].resets || !clear || symdyn_jumps(x, x, slope, y)) events[n++] = k;
+        }
+    for (int k = 0; k < SYMDYN_N_EVENTS && n; k++) run->events.fired[k] = 0;
+    for (int m = 0; m < n; m++) run->events.fired[events[m]] = 1;
+    failure = n > 1 ? symdyn_several_columns(run, t, x, after, slope, then, events, n, &ordered)
+                    : symdyn_jump_columns(run, t, x, after, slope, then);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.fired[k] = all[k];
+    if (!ordered && !run->events.entangled && !failure) {
+        run->events.entangled = 1;
+        symdyn_event_note(run, -1 - 2 * SYMDYN_N_EVENTS - events[0], t, x, x);
+    }
+    return failure;
+}
+#endif
 
 #if SYMDYN_HAS_BOUNDS && SYMDYN_EXPLICIT && !SYMDYN_BOUNDED_INPUTS
 // Whether every quantity that is looked for stays on its side within ranges of what they depend on.
@@ -647,7 +864,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, 
 
 // Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
 // too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
-// on. Returns how many.
+// on, -1 - 2 SYMDYN_N_EVENTS - k for one of several at one time on whose order the columns depend. Returns how many.
 SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows) {
     symdyn_run *const run = memory;
     const int n = run->events.n_noted;

@@ -19,6 +19,9 @@ typedef struct {
     double spacing;              // of samples at the most, s; 0: any
     double t, after[SYMDYN_NX];  // of the latest reset; the state after it
     double reset_gap;            // by how much a reset that was rejected is off
+#if SYMDYN_SENSITIVE
+    int entangled;  // columns depended on the order of events at one time
+#endif
 #if SYMDYN_SENSITIVE && SYMDYN_KEEPS_RESETS
     // What the constraints made of the latest reset: jumps of the speeds, impulses along entries that are held; whether the
     // coordinates that were wanted were off the constraints; which entries were asked for.
