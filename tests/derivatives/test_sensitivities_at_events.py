@@ -151,7 +151,7 @@ def test_jumps_are_found_over_the_steps(name: str) -> None:
         run = jumping(name).simulate(np.array([0, 3.0]), rtol=1e-10, sensitivities=["k", "gap"])
     assert sum("may jump" in doubt for doubt in run.doubts) == 1 and len(run.t) == 2
     if name == "edge":  # the times of these jumps depend on it
-        assert any("nothing in this motion but jumps that no event looks for depends on gap" in str(w.message) for w in found)
+        assert any("gap moves a jump of the right-hand side, where -gap + x passes zero" in str(w.message) for w in found)
 
 
 def test_batches_and_ensembles_tell_of_jumps() -> None:
