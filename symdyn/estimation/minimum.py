@@ -39,7 +39,7 @@ _NEXT, _ON = 1e-3, 1e-9
 _SAME = 1e-6
 # Open combinations are at the guess within this part of the way; weights of the rows for it; most steps to there, and how much
 # of the gradient a step takes.
-_BACK, _WEIGHTS, _TURNS, _PARTS = 1e-6, (1.0, 1e-2, 1e-4), 30, (0.05, 5.0)
+_BACK, _WEIGHTS, _TURNS, _PARTS = 1e-6, (1.0, 1e-3), 12, (0.05, 5.0)
 # Sizes of unknowns are those of their values, and at least this part of their scale.
 _SIZE = 1e-3
 # An unknown that went further than so many times the size of its guess, and is less sure than it went, has run off; one whose
@@ -173,7 +173,7 @@ def _determined(problem: Problem, point: Point) -> Determined:
 
 
 def _floor(problem: Problem) -> dict[str, float]:
-    """The least noise that is told from errors of the runs, by what was measured."""
+    """The least noise that can be distinguished from errors of the runs, by what was measured."""
     result = {}
     for name, values in problem.measured.items():
         spread = float(np.std(values)) or float(np.max(np.abs(values))) or 1.0
