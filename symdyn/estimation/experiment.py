@@ -66,6 +66,8 @@ def _checked(module: Module, experiment: Experiment, which: str, faults: list[st
     t = real_of(experiment.t, module.name, f"t of {which} must be numbers")
     if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         faults.append(f"t of {which} must be two or more finite times in increasing order")
+    if not isinstance(experiment.params, Mapping):
+        faults.append(f"params of {which} are {shown(experiment.params)}; pass a dictionary from names to numbers")
     shapes: dict[str, tuple[int, ...]] = {**dict.fromkeys(module.metadata.x, ()), **dict(module.metadata.outputs)}
     values: dict[str, np.ndarray] = {}
     if not isinstance(experiment.measured, Mapping) or not experiment.measured:

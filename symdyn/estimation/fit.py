@@ -100,6 +100,10 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
         unknowns.append(Unknown(name, None, number_of(guess, module.name, f"start of {name} must be a number")))
     for k, measured in enumerate(experiments):
         unknowns += [Unknown(f"{state}(0)", k, _guess(module, measured.experiment, state), len(experiments)) for state in states]
+    for k, measured in enumerate(experiments):
+        own = {str(name_of(key)) for key in measured.experiment.params}
+        faults += [f"{name} is fitted, and experiment {k + 1} has a value of its own for it in params; leave one of them out"
+                   for name in named if name in own]
     if not unknowns:
         faults.append("nothing is fitted; pass parameters, or initial")
     positive: dict[str, tuple[float, float]] = dict.fromkeys(metadata.masses, (0.0, float("inf")))
@@ -163,14 +167,23 @@ def _pairs(given: Any, what: str, named: Sequence[str], states: Sequence[str],
         name = str(name_of(key))
         if name not in there:
             faults.append(f"{what} has {shown(key)}, which is not fitted; fitted are {', '.join(there)}")
-        elif not isinstance(pair, (list, tuple)) or len(pair) != 2 or any(
-                isinstance(v, bool) or not isinstance(v, (int, float, np.number)) or np.isnan(v) for v in pair):
+        elif not isinstance(pair, (list, tuple)) or len(pair) != 2 or not all(map(_is_number, pair)):
             faults.append(f"{what} of {name} is {shown(pair)}; pass a pair of numbers")
         elif what == "priors" and not np.isfinite([float(v) for v in pair]).all():
             faults.append(f"{what} of {name} is {shown(pair)}; pass a finite mean and standard deviation, or leave the prior out")
         else:
             result[name] = (float(pair[0]), float(pair[1]))
     return result
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a double holds it; infinity is one, NaN none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        return False
+    try:
+        return not np.isnan(float(value))
+    except OverflowError:
+        return False
 
 
 def _noise(given: Any, measured: Sequence[str], faults: list[str]) -> dict[str, float]:

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 
+# Steps of a trial motion at most: so many, or so many times those of the latest motion. Where it blows up it would not end.
+_STEPS, _TIMES = 10_000, 50
+
+
 @dataclass(frozen=True)
 class Unknown:
     """What is fitted: a parameter, or an initial value "q1(0)" of one experiment of `of`."""
@@ -76,6 +80,7 @@ class Problem:
     def __post_init__(self) -> None:
         self._at: np.ndarray | None = None
         self._motions: list[Solution] = []
+        self._most: list[int] = []
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         """(n,), NaN where a motion cannot be computed: such a step is not taken."""
@@ -156,10 +161,13 @@ class Problem:
                     raise  # what was asked is at fault, not where the iteration has gone
                 self.failure = str(error)
                 return False
-            stopped = next((m for m in motions if not m.success), None)
+            # An event of the system may end a motion before the data.
+            stopped = next((m for m, e in zip(motions, self.experiments, strict=True)
+                            if not m.success or len(m.t) < len(e.t)), None)
             if stopped is not None:
                 self.failure = stopped.message
                 return False
+            self._most = [max(_STEPS, _TIMES * m.n_steps) for m in motions]
             self._at, self._motions = values.copy(), motions
         return True
 
@@ -180,7 +188,7 @@ class Problem:
             given = dict(zip(("q", "u", "z"), np.split(x, [sizes.q, sizes.q + sizes.u]), strict=True))
             asked = {u.asked: start.derivative(x, p, u.state) for u, _ in mine}
         return self.module.simulate(self.experiments[k].t, **given, params=params, inputs=experiment.inputs, rtol=self.rtol,
-                                    method=self.method, sensitivities=asked)
+                                    method=self.method, max_steps=self._most[k] if self._most else None, sensitivities=asked)
 
     def _start(self, k: int, unknown: Mapping[str, float]) -> dict[str, Any]:
         """q, u and z of an experiment, with the unknown initial values put in."""
@@ -194,5 +202,5 @@ class Problem:
             elif given is None or isinstance(given, Mapping):
                 result[group] = {**({str(name_of(key)): v for key, v in given.items()} if given else {}), **mine}
             else:
-                result[group] = [mine.get(name, value) for name, value in zip(names, given, strict=True)]
+                result[group] = [mine.get(name, value) for name, value in zip(names, np.ravel(given), strict=True)]
         return result

@@ -130,6 +130,22 @@ def test_levels_that_are_no_probability(level: Any, text: str) -> None:
     assert text in str(found.value)
 
 
+def test_motions_that_an_event_ends_before_the_data() -> None:
+    """A fall: from a guess that lands early there is no motion; on the way such a step is not taken."""
+    y = sd.coordinates("y")
+    g = sd.parameters("g")
+    system = sd.System("drop", gravity=[0, -g])
+    system.add_joint(sd.Prismatic("fall", system.ground, system.add_body("body", mass=1), y, axis=[0, 1]))
+    system.add_event("lands", y, direction=-1, stop=True)
+    system.defaults, system.initial = {g: 9.0}, {y: 1.0}
+    module, t = system.compile(), np.linspace(0, 0.45, 46)
+    experiment = sd.Experiment(t, {y: 1 - 9.81 * t**2 / 2}, q=[1.0])
+    assert sd.fit(module, experiment, [g]).values["g"] == pytest.approx(9.81, rel=1e-8)
+    assert sd.fit(module, sd.Experiment(t, experiment.measured, q=0.9), [g], ["y"]).values["y(0)"] == pytest.approx(1, rel=1e-8)
+    with pytest.raises(EvaluationError, match=r"no motion from the guess of the fit, event lands ended the motion at t = 0\.408"):
+        sd.fit(module, experiment, [g], start={g: 12.0})
+
+
 def test_picture(tmp_path: Path) -> None:
     found = sd.fit(damped(), [measured(1), measured(2)], ["d", "m"])
     figure = found.plot(tmp_path / "fit.png")
@@ -164,6 +180,8 @@ def test_faults_are_listed_together() -> None:
 @pytest.mark.parametrize(("change", "text"), [
     ({"t": [0, 0, 1]}, "t of experiment 1 must be two or more finite times in increasing order"),
     ({"measured": {}}, "experiment 1 measures nothing"),
+    ({"params": [1]}, "params of experiment 1 are [1]; pass a dictionary from names to numbers"),
+    ({"params": {"m": 1}}, "m is fitted, and experiment 1 has a value of its own for it in params; leave one of them out"),
     ({"measured": {"r": T}}, "experiment 1 measures 'r', which is neither a state nor an output; there are q, q_dot, tip"),
     ({"measured": {"tip": T}}, r"tip of experiment 1 has the shape (201,); needed is (201, 2), one row for each time"),
     ({"measured": {"q": np.full(201, np.inf)}}, "q of experiment 1 has infinite values; write NaN for those that are missing"),
@@ -180,6 +198,7 @@ def test_faults_of_data(change: dict[str, Any], text: str) -> None:
     ((sd.Experiment(T[:2], {"q": T[:2]}), ["m", "d", "c"]), "3 unknowns are fitted to 2 values; measure more, or fit less"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), {"m": (2, 3)}), "the guess 1 of m is not inside its bounds (2, 3)"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), {"m": 2}), "bounds of m is 2; pass a pair of numbers"),
+    ((sd.Experiment(T, {"q": T}), ["m"], (), {"m": (0.5, 10**400)}), "; pass a pair of numbers"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), None, None, {"r": 1}), "noise has 'r', which is not measured; noise of q"),
     ((sd.Experiment(T, {"q": T}), ["m"], (), [(0, 1)], [(0, 1)], None, [1.0]),
      "start is [1.0]; pass a dictionary from names to values, such as {l: 1.0}; bounds is [(0, 1)]; pass a dictionary from names "

@@ -189,7 +189,8 @@ def _depend_on_state(request: Request) -> set[int]:
     t, x = request.span[0], request.x0[:request.n_state]
     here = request.inputs.at(t, x)
     sides = [request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x))) for way in (-1.0, 1.0)]
-    return set(np.flatnonzero((here != sides[0]) | (here != sides[1])).tolist())
+    moved = [(here != side) & ~(np.isnan(here) & np.isnan(side)) for side in sides]
+    return set(np.flatnonzero(moved[0] | moved[1]).tolist())
 
 
 def gathered(module: Module, outcome: Outcome) -> list[str]:
