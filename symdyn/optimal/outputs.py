@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,15 +9,10 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments, Groups, structure_of
+from symdyn.runtime.losses import output_names
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
-
-
-def output_names(module: Module) -> tuple[str, ...]:
-    """Names of all entries of the outputs: "height" of a number, "tip[0]" and "frame[0,1]" of arrays."""
-    return tuple(name + (f"[{','.join(map(str, index))}]" if index else "")
-                 for name, shape in module.metadata.outputs for index in product(*map(range, shape)))
 
 
 class WithOutputs:

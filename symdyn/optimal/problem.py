@@ -16,9 +16,9 @@ from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
 from symdyn.optimal.functions import WithFunctions
-from symdyn.optimal.outputs import WithOutputs, output_names
+from symdyn.optimal.outputs import WithOutputs
 from symdyn.real_numbers import NotReal, number
-from symdyn.runtime.losses import Loss
+from symdyn.runtime.losses import Loss, output_names
 from symdyn.runtime.masses import real_parameters
 from symdyn.shown import name_of, shown
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,9 +30,10 @@ if TYPE_CHECKING:
 class Loss:
     """What a motion costs: the integral of `integral` over time, and `end` at its end.
 
-    Each is an expression of coordinates, speeds, extra states, inputs, parameters and sd.t; or a function of (t, x, p), with
-    x = [q; u; z] and p the parameters in the module's order, that returns its value and its derivatives by x (n_x,) and by p
-    (n_p,), of which the last may be left out where it is zero; or None.
+    Each is an expression of coordinates, speeds, extra states, inputs, parameters, sd.t and entries of outputs, which are called
+    "height" or "tip[0]"; or a function of (t, x, p), with x = [q; u; z] and p the parameters in the module's order, that returns
+    its value and its derivatives by x (n_x,) and by p (n_p,), of which the last may be left out where it is zero; or None. A
+    function sees no inputs; write what depends on them as an expression. Its derivatives are compared with a difference once.
 
     >>> import symdyn as sd
     >>> angle = sd.coordinates("angle")
@@ -148,32 +150,76 @@ def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: 
         raise ArgumentError(f"{module.name}: {what} of the loss is {shown(given)}; pass an expression of coordinates, speeds, "
                             "inputs, parameters and sd.t, or a function of (t, x, p) that returns its value and its "
                             "derivatives") from None
+    known = output_names(module)
+    outputs = _Outputs(module, [k for k, name in enumerate(known) if name in {str(s) for s in expression.free_symbols}], by, p)
     tape, jumping = _differentiated(f"{module.name}: {what} of the loss", expression, metadata.x, metadata.inputs,
-                                    metadata.parameters, tuple(by))
+                                    metadata.parameters, known, tuple(by), tuple(outputs.names))
     fixed = dict(zip(metadata.parameters, p.tolist(), strict=True))
 
     def at(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> dict[str, Any]:
-        return {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed}
+        return {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed,
+                **outputs.values(t, x, inputs)}
 
     def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
         found = evaluate_rows(tape, at(t, x, inputs), len(t))
         values, rows = found["values"].reshape(len(t)), found["slopes"].reshape(len(t), -1)
+        if outputs.names:
+            rows = outputs.folded(rows[:, None, :], t, x, inputs)[:, 0, 1:]
         others = rows[:, x.shape[1]:] if rows.shape[1] > x.shape[1] else None
         return _finite(module, what, t, Costs(values, rows[:, :x.shape[1]], others))
 
     def surfaces(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Surfaces:
         assert jumping is not None
         found = evaluate_rows(jumping, at(t, x, inputs), len(t))
-        return Surfaces(found["surfaces"], found["slopes"])
+        slopes = found["slopes"]
+        if outputs.names:
+            slopes = outputs.folded(slopes[:, :, 1:], t, x, inputs) + np.pad(slopes[:, :, :1], (
+                (0, 0), (0, 0), (0, x.shape[1] + len(by))))
+        return Surfaces(found["surfaces"], slopes)
 
     return Cost(all_rows, smooth=all(map(_is_smooth, tape.steps)), surfaces=None if jumping is None else surfaces)
 
 
+def output_names(module: Module) -> tuple[str, ...]:
+    """Names of all entries of the outputs: "height" of a number, "tip[0]" and "frame[0,1]" of arrays."""
+    return tuple(f"{name}[{','.join(map(str, index))}]" if shape else name
+                 for name, shape in module.metadata.outputs for index in product(*map(range, shape)))
+
+
+class _Outputs:
+    """Outputs of a module that an expression holds, by their places among all entries, with their derivatives from its code."""
+
+    def __init__(self, module: Module, places: Sequence[int], by: Sequence[str], p: np.ndarray) -> None:
+        self.module, self.places, self.p = module, list(places), p
+        known = output_names(module)
+        self.names, self.n_y = [known[k] for k in places], len(known)
+        given = (*module.metadata.inputs, *module.metadata.parameters)
+        self.by = [given.index(name) for name in by]
+
+    def values(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> dict[str, np.ndarray]:
+        if not self.names:
+            return {}
+        rows = self.module.evaluate("outputs", t, x, self.p, inputs).reshape(len(t), -1)
+        return dict(zip(self.names, rows[:, self.places].T, strict=True))
+
+    def folded(self, slopes: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """From slopes (n, k, ...) by the state, by the others and by these outputs to those by the time, which these outputs
+        make, by the state and by the others, (n, k, 1 + n_x + n_by)."""
+        n = len(t)
+        J: Any = self.module.jacobian(t, x, self.p, inputs, ["t", "x", "inputs", "params"], "outputs")
+        part = lambda rows: np.asarray(rows).reshape(n, self.n_y, np.shape(rows)[-1])[:, self.places]
+        others = np.concatenate([part(J.inputs), part(J.params)], axis=2)[:, :, self.by]
+        along = np.concatenate([np.asarray(J.t).reshape(n, self.n_y, 1)[:, self.places], part(J.x), others], axis=2)
+        found = slopes[:, :, slopes.shape[2] - len(self.places):] @ along
+        found[:, :, 1:] += slopes[:, :, :slopes.shape[2] - len(self.places)]
+        return np.asarray(found)
+
+
 @lru_cache(maxsize=64)  # an optimizer asks for the gradient of one loss many times
 def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], inputs: Sequence[str], parameters: Sequence[str],
-                    by: Sequence[str]) -> tuple[Tape, Tape | None]:
-    """An expression, and its derivatives by the states and, unless these are all zero, by others; the surfaces where it may jump
-    with their derivatives, None without one. what: how messages call it."""
+                    outputs: Sequence[str], by: Sequence[str], used: Sequence[str]) -> tuple[Tape, Tape | None]:
+    """An expression, and its derivatives by the states and, unless these are all zero, by others, and then by the outputs that it
+    uses; the surfaces where it may jump with their derivatives, None without one. what: how messages call it."""
     from symdyn.tape import node as kinds
     from symdyn.tape.differentiate import reverse
     from symdyn.tape.jumps import jumps
@@ -184,25 +230,27 @@ def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], input
 
     recorder = Recorder()
     names = {"t": kinds.TIME, **dict.fromkeys(states, kinds.STATE), **dict.fromkeys(inputs, kinds.INPUT),
-             **dict.fromkeys(parameters, kinds.PARAMETER)}
+             **dict.fromkeys(parameters, kinds.PARAMETER), **dict.fromkeys(used, kinds.STATE)}
     leaves = {name: recorder.leaf(name, kind) for name, kind in names.items()}
     unknown = sorted(str(s) for s in expression.free_symbols if str(s) not in leaves)
     if unknown:
         raise ArgumentError(f"{what} has {', '.join(unknown)}, which is no state, input or parameter here; there are "
-                            f"{', '.join(names)}")
+                            f"{', '.join(dict.fromkeys((*names, *outputs)))}"
+                            + ("; make what it says of bodies outputs, system.add_output, and name these"
+                               if any("(" in name for name in unknown) else ""))
     try:
         value = record_expression(recorder, expression, {s: leaves[str(s)] for s in expression.free_symbols})
     except UnsupportedExpression as error:
         raise ArgumentError(f"{what}: {error}; write it in coordinates and speeds, or pass a function of (t, x, p) that returns "
                             "its value and its derivatives") from None
-    slopes = reverse(recorder, value, [leaves[name] for name in (*states, *by)])
-    if all(map(is_zero, slopes[len(states):])):
+    slopes = reverse(recorder, value, [leaves[name] for name in (*states, *by, *used)])
+    if not used and all(map(is_zero, slopes[len(states):])):
         slopes = slopes[:len(states)]
     costs = Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
     found = [jump.surface for jump in jumps(recorder, [value])]
     if not found:
         return costs, None
-    rows = [reverse(recorder, surface, [leaves[name] for name in ("t", *states, *by)]) for surface in found]
+    rows = [reverse(recorder, surface, [leaves[name] for name in ("t", *states, *by, *used)]) for surface in found]
     return costs, Tape.of(recorder, surfaces=np.array(found, dtype=object), slopes=np.array(rows, dtype=object))
 
 

@@ -401,7 +401,7 @@ class Module:
         wrt   by what: of "x", "inputs", "params", "t" (the others held), "ud" (accelerations, of functions that take them)
         of    the name of a function, such as "inverse_dynamics", "lam", "reactions", "outputs", "energy"; each derivative has the
               shape of the function with one axis more
-        ud    accelerations (n_u,) of functions that take them
+        ud    accelerations (n_u,) of functions that take them; zero if they are left out
         t, x, params, inputs and ud are those of `evaluate`; of rows of states there are rows of derivatives. With C several
         columns are computed at once where that is faster, a direction in each SIMD lane. Accelerations and multipliers are
         differentiated through what they are solved from, so that no factorization is differentiated.
@@ -767,7 +767,9 @@ class Module:
         method   "dop853" (default) or "bs54"; all others as for `simulate`
 
         They are the derivatives of what these steps compute, exact to rounding at given lengths of the steps; with constraints
-        as far as the corrections are small. The cost is that of some simulations, however many numbers there are; memory grows
+        as far as the corrections are small. The integral of a loss keeps the tolerances, too: steps are taken again, shorter,
+        where its integrand needs it, as at kinks of the equations; a warning says what is not resolved, such as poles and jumps
+        of functions of the user. The cost is that of some simulations, however many numbers there are; memory grows
         with the square root of the number of steps; across events with that of steps. Across events, resets, switches of rigid
         contacts (not across both) and instants of sampled controllers (which need their gradient) the motion is cut, and the
         derivatives are as exact as the tolerances; a loss at an end by an event moves with the time of it.

@@ -180,3 +180,25 @@ def test_motion_that_stops_early() -> None:
     system.defaults, system.initial = {k: 1, m: 1}, {q: 1}
     with pytest.raises(EvaluationError, match=r"the step became too small|is not finite"):
         system.embedding().compile().gradient(sd.Loss(end=q), ["k"], (0, 10))
+
+
+def test_outputs_in_a_loss() -> None:
+    """The tip of two bars like its closed form, also in an expression that jumps where it passes."""
+    system = sd.systems.n_link_pendulum(2)
+    tip = sd.position(system.bodies[-1], [1, 0])
+    system.add_output("tip", tip)
+    arm = system.compile()
+    a, b, end = sp.Symbol("tip[0]"), sp.Symbol("tip[1]"), {"t": (0, 1), "q": [-1.2, 0.3], "rtol": 1e-10}
+    names = ["l1", "m2", "q1(0)"]
+    own = (L1 * sp.cos(Q1) + sp.cos(Q1 + Q2), L1 * sp.sin(Q1) + sp.sin(Q1 + Q2))
+    place = [float(e.subs({Q1: 0.4, Q2: 0.9, L1: 1})) for e in own]
+    np.testing.assert_allclose(arm.evaluate("outputs", 0, [0.4, 0.9, 0, 0]).ravel(), place, rtol=1e-12)
+    for of in (lambda x, y: sd.Loss(integral=x**2 + y * Q1, end=x * y), lambda x, y: sd.Loss(integral=sp.sign(x))):
+        by_outputs, explicit = arm.gradient(of(a, b), names, **end), arm.gradient(of(*own), names, **end)
+        assert by_outputs.value == pytest.approx(explicit.value, rel=1e-9)
+        np.testing.assert_allclose(by_outputs.array, explicit.array, rtol=1e-7, atol=1e-9)
+        assert explicit.array.any()
+    with pytest.raises(ArgumentError, match=r"tip\[2\], which is no state.* tip\[0\], tip\[1\]"):
+        arm.gradient(sd.Loss(end=sp.Symbol("tip[2]")), names, **end)
+    with pytest.raises(ArgumentError, match=r"make what it says of bodies outputs, system.add_output, and name these"):
+        arm.gradient(sd.Loss(end=tip[0]), names, **end)
