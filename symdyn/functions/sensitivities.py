@@ -6,7 +6,6 @@ Its entries stand behind the extra states z, one column after the other.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,12 +35,6 @@ def column_names(symbols: Symbols, sensitivities: Sequence[str]) -> list[str]:
     """Names of the entries of all columns, which are extra states; no symbol can have them."""
     states = [s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]
     return [f"(d {x} by {k + 1} {by})" for k, by in enumerate(sensitivities) for x in states]
-
-
-def shown_name(name: str) -> str:
-    """An entry of a state as messages call it: of a column "the derivative of q1 by l1"."""
-    found = re.fullmatch(r"\(d (.+) by \d+ (.*)\)", name)
-    return name if found is None else f"the derivative of {found[1]} by {found[2] or 'an initial value'}"
 
 
 def held_names(sensitivities: Sequence[str], held: Sequence[str]) -> list[str]:

@@ -11,9 +11,9 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
-from symdyn.functions.sensitivities import shown_name
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.contradicted import contradiction
+from symdyn.runtime.integrating.compiled import shown_name
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symdyn.tape.floats import evaluate_rows
-
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
     from symdyn.tape.tape import Tape
@@ -44,6 +42,8 @@ class Breaks:
 
     def crossed(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Which of steps of lengths h (n,) cross a surface and are too long, by times, states and inputs at all stages."""
+        from symdyn.tape.floats import evaluate_rows
+
         metadata = self.module.metadata
         values = {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)),
                   **dict(zip(metadata.parameters, p.tolist(), strict=True))}

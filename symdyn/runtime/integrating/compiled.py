@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import re
 import time as clock
 import warnings
 from dataclasses import replace
@@ -14,7 +15,6 @@ import numpy as np
 from symdyn.backend.c_records import fields_of
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
-from symdyn.functions.sensitivities import shown_name
 from symdyn.runtime.inputs.inputs import not_finite
 from symdyn.runtime.integrating.chatter import STEPS, chatter_of
 from symdyn.runtime.integrating.events import CHATTER, Happened, at_once, ended, entangled, not_known, not_proved, too_quick
@@ -352,6 +352,12 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
         why += chatter.of_small_steps(t, x) if chatter is not None else ""
         return describe_stop(metadata, t, x, f"the step became too small ({of.h:.3g} s) for the tolerances{why}")
     return describe_stop(metadata, t, x, f"the integrator does not go on (status {status})")
+
+
+def shown_name(name: str) -> str:
+    """An entry of a state as messages call it: of a column "the derivative of q1 by l1"."""
+    found = re.fullmatch(r"\(d (.+) by \d+ (.*)\)", name)
+    return name if found is None else f"the derivative of {found[1]} by {found[2] or 'an initial value'}"
 
 
 def _series_reason(run: Run, report: Report) -> str:
