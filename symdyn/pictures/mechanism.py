@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Times at which is looked where contacts are; what stays where it is, of how far all goes.
 _SAMPLES, _SAME = 40, 1e-6
+# Times at which is looked how far joints slide, at most.
+_ROWS = 2000
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
         found = module.evaluate(name, solution.t[first], solution.x[first], solution.params, solution.inputs[first])
         return np.asarray(found, dtype=float).reshape(-1, columns)
 
-    points = at("joint_points", 6)
+    points = at("joint_points", 6) if "joint_axes" in module.functions else at("", 6)
+    springs = at("spring_points", 6)
     names = list(zip(about.reactions, about.reaction_bodies, about.reaction_kinds, strict=True)) if len(points) else []
     inertia = at("inertial_parameters", 10)
     drawn = {about.bodies.index(r["body"]) for r in about.drawn if r.get("body") in about.bodies}
@@ -96,8 +99,9 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
             given = np.pad(solution.outputs[output][first], (0, 3 - solution.outputs[output].shape[1]))
             R, o = start[point.body, 3:].reshape(3, 3), start[point.body, :3]
             tips.append((point.body, R.T @ (given - o)))
-    found = Mechanism(about.bodies, start, at("positions", 3), [(n, *ends, kind) for n, ends, kind in names], points,
-                      at("joint_axes", 3), about.connections, at("spring_points", 6),
+    centres = at("positions", 3) if "positions" in module.functions else start[:, :3]
+    found = Mechanism(about.bodies, start, centres, [(n, *ends, kind) for n, ends, kind in names], points,
+                      at("joint_axes", 3) if len(points) else at("", 3), about.connections if len(springs) else (), springs,
                       inertia if len(inertia) == len(start) else None, about.planar, about.down, frozenset(drawn), tips)
     corners, wheels = _touching(solution, found, frames)
     return replace(found, travels=_travels(found, frames), corners=corners, wheels=wheels)
@@ -136,6 +140,7 @@ def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[lis
 def _travels(m: Mechanism, frames: np.ndarray) -> Sequence[tuple[float, float]]:
     """How far the child of every joint gets along its axis: least and most, m."""
     hung = Hung.of(m)
+    frames = frames[np.unique(np.linspace(0, len(frames) - 1, _ROWS).astype(int))]
     still = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel()]), (len(frames), 1, 12))
     frames = np.concatenate([frames, still], axis=1)
     rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)

@@ -62,7 +62,7 @@ class Solids:
         module = solution.module
         records = module.metadata.drawn
         bent = bendings(solution)
-        jointed = "joint_points" in module.functions
+        jointed = {"joint_points", "joint_axes"} <= set(module.functions)
         if not (records or bent or jointed) or "frames" not in module.functions or not len(solution.t):
             return None
         frames = solution.rows("frames").reshape(len(solution.t), -1, 12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -135,3 +136,14 @@ def test_films_show_the_same_solids(loop: Solution) -> None:
     corners = np.concatenate([path.vertices for path in scene.get_paths()])
     wanted = np.concatenate([places for _, places in placed(loop, int(np.argmin(abs(loop.t - 0.25))))])[:, :2]
     assert np.allclose([corners.min(axis=0), corners.max(axis=0)], [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-3)
+
+
+@pytest.mark.parametrize("left_out", ["joint_axes", "spring_points", "inertial_parameters", "joint_points"])
+def test_modules_without_some_functions_are_drawn(left_out: str) -> None:
+    solution = sd.systems.andrews_squeezer().augmented().compile("numpy").simulate((0.0, 0.002))
+    metadata = solution.module.metadata
+    fewer = dataclasses.replace(metadata, functions=tuple(name for name in metadata.functions if name != left_out))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solution.module, "metadata", fewer)
+        assert left_out not in solution.module.functions
+        assert len(solution.picture(0.0).axes) == 1 and len(solution.view().html) > 10_000
