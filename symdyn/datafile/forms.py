@@ -29,7 +29,7 @@ ARGUMENTS = {
     **dict.fromkeys(("coordinate", "mass", "stiffness", "damping", "length", "pitch", "ratio", "offset", "density", "area",
                      "coefficient", "weight", "friction", "restitution", "width", "breakaway", "sliding", "lower", "upper",
                      "radius", "height", "frequency", "ramp", "gravity", "exponent", "dissipation", "slip_speed", "stribeck",
-                     "viscous", "elastic", "depth", "value", "rate", "expression", "ignored"), "expression"),
+                     "viscous", "elastic", "depth", "tube", "value", "rate", "expression", "ignored"), "expression"),
     **dict.fromkeys(("coordinates", "force", "torque", "amplitude", "phase", "reference"), "expressions"),
     **dict.fromkeys(("axis", "parent_point", "child_point", "point", "point_a", "point_b", "position", "wind", "anchor",
                      "fairlead", "com", "center", "size", "at", "normal"), "vector"),
@@ -118,8 +118,8 @@ CONTACTS = [Form("Contact", contact.Contact, contact.Contact, {**_FRICTION, "sha
 GROUPS = [Form("ContactGroup", group.ContactGroup, group.ContactGroup, {**_FRICTION, "shape": lambda c: c.shapes})]
 BODIES = [Form("body", System.add_body, object)]
 # What stands in an entry as a table of its own, by its `type`.
-SHAPES = _forms([shapes.Point, shapes.Sphere, shapes.Disc, shapes.Cylinder, shapes.Box, shapes.Plane, shapes.Bore, shapes.Curve,
-                 shapes.Surface], {})
+SHAPES = _forms([shapes.Point, shapes.Sphere, shapes.Disc, shapes.Torus, shapes.Cylinder, shapes.Box, shapes.Plane, shapes.Bore,
+                 shapes.Curve, shapes.Surface], {})
 PLAIN = {"boxes": Form("Box", elements.Box, elements.Box), "compliance": Form("Compliance", Compliance, Compliance),
          "bristles": Form("Bristles", Bristles, Bristles)}
 ORIENTATIONS = (EulerAngles, EulerParameters)

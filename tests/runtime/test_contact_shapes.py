@@ -59,6 +59,8 @@ CASES: dict[str, tuple[Any, Callable[..., float]]] = {
     "sphere": ((Shapes.Sphere(0.2, CENTER.tolist()), PLANE), lambda p: above(p(CENTER[None]), NORMAL, POINT) - 0.2),
     "disc": ((Shapes.Disc(0.3, AXIS.tolist(), CENTER.tolist()), PLANE),
              lambda p: above(p(circle(0.3, AXIS, CENTER)), NORMAL, POINT)),
+    "torus": ((Shapes.Torus(0.3, 0.05, AXIS.tolist(), CENTER.tolist()), PLANE),
+              lambda p: above(p(circle(0.3, AXIS, CENTER)), NORMAL, POINT) - 0.05),
     "cylinder": ((Shapes.Cylinder(0.3, 1.0, AXIS.tolist(), CENTER.tolist()), PLANE),
                  lambda p: above(p(circle(0.3, AXIS, CENTER + AXIS / 2)), NORMAL, POINT)),
     "spheres": ((Shapes.Sphere(0.2, CENTER.tolist()), Shapes.Sphere(0.1, POINT.tolist())),

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.model.contacts.contact import Contact
-from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface
+from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface, Torus
 from symdyn.model.faults import Faults
 from symdyn.model.quantity import Measure, Place, Quantity
 
@@ -76,6 +76,8 @@ class Geometry:
             axis = (sp.S.Zero, sp.S.Zero, sp.S.One)
         if isinstance(shape, Disc):
             return [self._edge(name, center, axis, radius)]
+        if isinstance(shape, Torus):
+            return [self._edge(name, center, axis, radius, self._number(shape.tube, "tube"))]
         assert isinstance(shape, Cylinder)
         half_length = self._number(shape.length, "length") / 2
         ends = [_add(center, _scaled(axis, s * half_length)) for s in (1, -1)]
@@ -122,16 +124,17 @@ class Geometry:
             gap, normal, tangents = self._from_graph(other, place)
         return Touch(name, at, _scaled(normal, -radius), gap - radius, normal, tangents)
 
-    def _edge(self, name: str, center: Place, axis: Triple, radius: sp.Expr) -> Touch:
-        """The lowest point of a circle above a plane: from the centre -r (n - (n e) e)/sqrt(1 - (n e)^2)."""
+    def _edge(self, name: str, center: Place, axis: Triple, radius: sp.Expr, tube: sp.Expr = sp.S.Zero) -> Touch:
+        """The lowest point of a circle above a plane: from the centre -r (n - (n e) e)/sqrt(1 - (n e)^2); that of a tube around
+        the circle is further by -tube n."""
         plane = self.contact.on_b
         assert isinstance(plane, Plane)
         gap, normal, tangents = self._from_plane(plane, self._position(self.a, center))
         e = self._turned(self.a, axis)
         along = _dot(normal, e)
         steep = sp.sqrt(1 - along**2)
-        lever = _scaled(_add(normal, _scaled(e, along), -1), -radius / steep)
-        return Touch(name, center, lever, gap - radius * steep, normal, tangents)
+        lever = _add(_scaled(_add(normal, _scaled(e, along), -1), -radius / steep), _scaled(normal, tube), -1)
+        return Touch(name, center, lever, gap - radius * steep - tube, normal, tangents)
 
     def _from_plane(self, plane: Plane, place: Triple) -> tuple[sp.Expr, Triple, tuple[Triple, ...]]:
         default = (0, 1, 0) if self.planar else (0, 0, 1)

@@ -1,7 +1,7 @@
 """Shapes of contacts: what touches on body a, and what it touches on body b.
 
-On a: Point, Sphere (in a plane a circle), Disc (its edge), Cylinder (the edges of its ends), Box (its corners). On b: Plane,
-Sphere, Curve, Surface. Numbers may be expressions of parameters; points and directions are in body axes.
+On a: Point, Sphere (in a plane a circle), Disc (its edge), Torus, Cylinder (the edges of its ends), Box (its corners). On b:
+Plane, Sphere, Bore, Curve, Surface. Numbers may be expressions of parameters; points and directions are in body axes.
 """
 
 from __future__ import annotations
@@ -59,6 +59,23 @@ class Disc:
     """
 
     radius: Scalar
+    axis: Vector = UP
+    center: Vector = ORIGIN
+
+
+@dataclass(frozen=True)
+class Torus:
+    """A torus on body a, in space, such as a tyre; it touches a Plane at its lowest point.
+
+    radius   of the circle in its middle, m; tube: radius of the tube around that, m
+    axis     of the torus, body axes; center: m, body axes
+
+    >>> sd.contacts.Torus(0.3, 0.02, axis=[0, 1, 0]).tube
+    0.02
+    """
+
+    radius: Scalar
+    tube: Scalar
     axis: Vector = UP
     center: Vector = ORIGIN
 
@@ -163,5 +180,5 @@ class Surface:
     y: sp.Symbol
 
 
-Shape = Point | Sphere | Disc | Cylinder | Box
+Shape = Point | Sphere | Disc | Torus | Cylinder | Box
 Counterpart = Plane | Sphere | Bore | Curve | Surface
