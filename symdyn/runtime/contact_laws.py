@@ -123,20 +123,24 @@ def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
 
 def _is_simple(sites: Sequence[Site]) -> bool:
     """Whether there is one contact only, whose solutions are closed forms of one unknown."""
-    return len(sites) == 1 and (sites[0].bounded or sites[0].slip is not None or not sites[0].tangents)
+    return len(sites) == 1 and (sites[0].bounded or sites[0].slip is not None or not sites[0].tangents or (
+        len(sites[0].tangents) == 1 and sites[0].least == 0))
 
 
 def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
     """Solutions of one contact whose friction is known, as the tables of combinations find them: the case of nearly all
     impacts."""
-    k, tangents, slip = site.rows[0], site.tangents, np.zeros(0) if site.slip is None else site.slip
-    column = np.zeros(len(b))
-    column[k] = 1.0
-    column[tangents] = -site.kinetic * slip
-    gain = D @ column
+    k, tangents = site.rows[0], site.tangents
     size = max(float(np.abs(b).max()), float(np.abs(D[:, k]).max()) * site.least, 1e-300)
     found = []
     for mode in _options(site):
+        if mode.kind == STICKING:
+            found += _sticks(D, b, site, mode, size)
+            continue
+        column = np.zeros(len(b))
+        column[k] = 1.0
+        column[tangents] = -site.kinetic * mode.direction
+        gain = D @ column
         if mode.kind == OPEN or not mode.held:
             lam = site.least if mode.kind != OPEN else 0.0
             w = b + gain * lam
@@ -147,9 +151,23 @@ def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
             w = b + gain * lam
             w[k] = 0.0
             force = max(abs(lam) * float(np.abs(column).max()), size / max(float(np.diag(D).max()), 1e-300))
-            if lam >= site.least - NOISE * force:
+            along = site.slip is not None or float(w[tangents] @ mode.direction) >= -NOISE * size
+            if lam >= site.least - NOISE * force and along:
                 found.append(Solved((mode,), column * lam, w, False))
     return _different(b, found)
+
+
+def _sticks(D: np.ndarray, b: np.ndarray, site: Site, mode: Mode, size: float) -> list[Solved]:
+    """The solution in which one contact in a plane sticks, if there is one."""
+    (a, c), (_, d) = D.tolist()
+    determinant, gain = a * d - c * c, max(a, d)
+    if determinant <= DEPENDENT * gain**2:  # a tangent along which nothing moves
+        table = _Table(D, b, [site], [[mode]])
+        return [one for one in table.solved([[0]]) if one is not None]
+    lam = np.array([c * b[1] - d * b[0], c * b[0] - a * b[1]]) / determinant
+    force = max(float(np.abs(lam).max()), size / max(gain, 1e-300))
+    good = lam[0] >= -NOISE * force and abs(lam[1]) <= site.static * lam[0] + NOISE * force
+    return [Solved((mode,), lam, np.zeros(2), False)] if good else []
 
 
 def _one_bounded(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
