@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import symdyn as sd
+from symdyn.errors import EvaluationError
 from symdyn.runtime.module import Module
 
 MASSES, PRESSED = np.array([6.0, 5.0]), 30.0  # kg along x and along y; N
@@ -88,3 +89,20 @@ def test_a_disc_that_sticks_and_slips_on_its_edge_is_as_accurate_as_its_toleranc
     for run, bound in zip(runs, (1e-5, 1e-7), strict=False):
         assert run.n_steps < 1500
         np.testing.assert_allclose(run.q[-1], runs[-1].q[-1], rtol=0, atol=bound)
+
+
+def test_derivatives_go_through_the_beginning_of_a_slip_and_gradients_are_rejected() -> None:
+    """A mass slips down the slope from rest, by (|g_t| - mu g_n) t^2/2 along the tangential gravity g_t."""
+    mu, system, carrier = sd.parameters("mu"), sd.System("slope", gravity=[3, 1, -9]), None
+    system.defaults[mu] = 0.1
+    for q, axis, mass in zip(sd.coordinates("x y z"), np.eye(3, dtype=int), (0, 0, 2), strict=True):
+        body = system.add_body(f"body_{q.name}", mass=mass)
+        system.add_joint(sd.Prismatic(f"along_{q.name}", carrier or system.ground, body, axis=axis, coordinate=q))
+        carrier = body
+    system.add_contact(sd.Contact("sole", body, system.ground, friction=mu))
+    module, along = system.compile(), np.array([3.0, 1.0]) / np.sqrt(10)
+    solution = module.simulate((0, 1), rtol=1e-11, sensitivities=["mu"])
+    np.testing.assert_allclose(solution.q[-1, :2], along * (np.sqrt(10) - 0.9) / 2, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(solution.sensitivity["mu"][-1, :2], -9 / 2 * along, rtol=0, atol=1e-8)
+    with pytest.raises(EvaluationError, match="contact sole begins or ceases to slip in space"):
+        module.gradient(sd.Loss(end=sp.Symbol("x")), ["mu"], (0, 1))

@@ -16,6 +16,7 @@ from symdyn.errors import EvaluationError
 from symdyn.runtime.contact_laws import SLIDING, STICKING
 from symdyn.runtime.integrating.at_breaks import Breaks
 from symdyn.runtime.integrating.contact_columns import Switch
+from symdyn.runtime.integrating.contacts import HOLDING, HOLDS
 from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
 from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.way_back import Feedback, Way
@@ -93,8 +94,11 @@ class ContactChain:
             raise EvaluationError(f"{self.module.name}: a gradient goes across the switches of contacts or across other events, "
                                   f"not both; {', '.join(strange)} happened as well: leave them out, events=False, or take "
                                   "simulate(..., sensitivities=[...])")
-        turned = [record.name for k, record in enumerate(records) if record.tangents == 2 and any(
-            {a.modes[k], b.modes[k]} == {SLIDING, STICKING} for a, b in pairwise(outcome.phases))]
+        holds = metadata.parameters.index(HOLDING) if HOLDING in metadata.parameters else 0
+        held = [phase.modes for phase in outcome.phases if HOLDING in metadata.parameters and phase.p[holds] >= HOLDS]
+        turned = [record.name for k, record in enumerate(records) if record.tangents == 2 and (any(
+            {a.modes[k], b.modes[k]} == {SLIDING, STICKING} for a, b in pairwise(outcome.phases)) or any(
+            modes[k] == SLIDING for modes in held))]
         if turned:
             raise EvaluationError(f"{self.module.name}: contact {', '.join(turned)} begins or ceases to slip in space, where "
                                   "steps back over the direction of friction are not accurate; take "
