@@ -11,7 +11,7 @@ import sympy as sp
 if TYPE_CHECKING:
     from os import PathLike
 
-    from sympy.physics.vector import Dyadic, ReferenceFrame
+    from sympy.physics.vector import Dyadic, Point, ReferenceFrame
     from sympy.physics.vector import Vector as SympyVector
 
     from symdyn.model.bodies import Body
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     Named: TypeAlias = Mapping[str, T] | Mapping[sp.Symbol, T] | Mapping[str | sp.Symbol, T]
     # A number or an expression of SymPy's.
     Scalar: TypeAlias = float | sp.Expr
-    # Components, or a vector in axes of its own.
-    Vector: TypeAlias = Sequence[Scalar] | sp.MatrixBase | np.ndarray | SympyVector
+    # A point of SymPy's mechanics.
+    MechanicsPoint: TypeAlias = Point
+    # Components, or a vector in axes of its own; of what is a point, also one that is located from the body's origin.
+    Vector: TypeAlias = Sequence[Scalar] | sp.MatrixBase | np.ndarray | SympyVector | MechanicsPoint
     # Entries by rows, or the diagonal, or a dyadic; in a plane a moment of inertia about z.
     Inertia: TypeAlias = Scalar | Sequence[Scalar] | Sequence[Sequence[Scalar]] | sp.MatrixBase | np.ndarray | Dyadic
     # Rows of entries.

@@ -51,6 +51,10 @@ class Entry:
     default: Any
 
 
+# Arguments that are objects of SymPy's mechanics, which files have no words for.
+OBJECTS = ("body.frame", "body.origin")
+
+
 @dataclass(frozen=True)
 class Form:
     """A kind of element.
@@ -69,7 +73,7 @@ class Form:
         """The entries, in the order of the arguments."""
         found = {}
         for name, one in inspect.signature(self.made).parameters.items():
-            if name != "self":
+            if name != "self" and f"{self.word}.{name}" not in OBJECTS:
                 kind = ARGUMENTS.get(f"{self.word}.{name}") or ARGUMENTS[name]
                 empty = one.default is inspect.Parameter.empty
                 found[name] = Entry(kind, empty, None if empty or one.default is ... else one.default)

@@ -179,8 +179,6 @@ class _Writer:
         label = getattr(element, "name", None) or getattr(element, "label", None) or form.word
         found: dict[str, Any] = {"type": form.word} if typed else {}
         for argument, entry in form.entries.items():
-            if form.word == "body" and argument == "frame":
-                continue
             value = form.value(element, argument)
             if value is None:
                 continue
@@ -292,8 +290,8 @@ def _expressions_in(value: Any, seen: set[int]) -> Iterable[sp.Basic]:
 
 
 # Attributes of elements that follow from others.
-_DERIVED = {"transform", "given_frame", "frame", "faults", "doubts", "rigid_contacts", "compliant_contacts", "lowered_groups",
-            "_faults", "_warned"}
+_DERIVED = {"transform", "given_frame", "frame", "given_origin", "origin", "faults", "doubts", "rigid_contacts",
+            "compliant_contacts", "lowered_groups", "_faults", "_warned"}
 
 
 # -- layout

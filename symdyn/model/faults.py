@@ -12,7 +12,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.model.bodies import Body
 from symdyn.model.symbols import as_expression, finite
-from symdyn.model.sympy_vectors import components, is_dyadic, is_frame, is_sympy_vector
+from symdyn.model.sympy_vectors import components, is_dyadic, is_frame, is_point, is_sympy_vector, located
 from symdyn.shown import name_of, shown
 
 # Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
@@ -50,6 +50,23 @@ class Faults(list[str]):
             entries = [0, 0, 0]
         row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
         return sp.ImmutableMatrix(3, 1, row + [sp.S.Zero] * (3 - len(row)))
+
+    def point(self, value: Any, what: str, planar: bool = False, body: Any = None) -> sp.ImmutableMatrix:
+        """A point of a body, from its origin in its axes: as `vector`, or a Point of SymPy's that is located from the origin.
+
+        body   the body, or its name
+        """
+        if is_point(value):
+            value = self.located(value, body.origin if isinstance(body, Body) else None, what)
+        return self.vector(value, what, planar, body)
+
+    def located(self, point: Any, origin: Any, what: str) -> Any:
+        """The vector to a Point of SymPy's from a body's origin, which is another; zero where that is not known."""
+        try:
+            return located(point, origin, what)
+        except ModelError as error:
+            self.extend(error.faults)
+            return [0, 0, 0]
 
     def expressions(self, value: Any, what: str) -> tuple[sp.Expr, ...]:
         """Any number of scalar expressions; a single one stands for itself."""

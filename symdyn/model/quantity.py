@@ -249,7 +249,7 @@ def _name(owner: Any, what: str) -> str:
 
 def _point(at: Any, what: str, body: Any) -> Place:
     faults = Faults()
-    taken = tuple(faults.vector(at, what, True, body))
+    taken = tuple(faults.point(at, what, True, body))
     if faults:
         raise ModelError(list(faults))
     return taken

@@ -24,6 +24,37 @@ def is_frame(value: Any) -> bool:
     return type(value).__module__ == "sympy.physics.vector.frame"
 
 
+def is_point(value: Any) -> bool:
+    """Whether a value is a Point of sympy.physics.vector."""
+    return type(value).__module__ == "sympy.physics.vector.point"
+
+
+def new_point(name: str) -> Any:
+    """A Point."""
+    from sympy.physics.vector import Point
+
+    return Point(name)
+
+
+def as_point(value: Any, what: str) -> Any:
+    """A Point as it is, or None. Raises ModelError for anything else."""
+    if value is not None and not is_point(value):
+        raise ModelError([f"{what} is {value!r}; pass a Point of sympy.physics.mechanics"])
+    return value
+
+
+def located(point: Any, origin: Any, what: str) -> Any:
+    """The vector to a Point from a body's origin. Raises ModelError where no path leads there, or the origin is not known."""
+    if origin is None:
+        raise ModelError([f"{what} is the SymPy point {point}, and of its body no origin is known here; pass the body itself in "
+                          "place of its name, or the components from the body's origin"])
+    try:
+        return point.pos_from(origin)
+    except ValueError:
+        raise ModelError([f"{what} is the SymPy point {point}, which is not located from {origin}, the body's origin; locate it "
+                          "from body.origin, or pass that origin as origin= to add_body (of the ground to System)"]) from None
+
+
 def new_frame(name: str) -> Any:
     """A ReferenceFrame."""
     from sympy.physics.vector import ReferenceFrame

@@ -33,7 +33,7 @@ from symdyn.model.record import Model, NamedOutput
 from symdyn.model.shapes import Drawn, drawn
 from symdyn.model.state import State
 from symdyn.model.symbols import Coordinate, as_coordinate
-from symdyn.model.sympy_vectors import as_frame, frames_of, is_dyadic, is_sympy_vector
+from symdyn.model.sympy_vectors import as_frame, as_point, frames_of, is_dyadic, is_point, is_sympy_vector
 from symdyn.real_numbers import length_of
 from symdyn.shown import shown
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from symdyn.formulation.printed.independent_speeds import MotionEquations
     from symdyn.formulation.trees.embedding import EmbeddedEquations
     from symdyn.formulation.trees.recursive import RecursiveEquations
-    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Named, Numbers, Scalar, Values, Vector
+    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, MechanicsPoint, Named, Numbers, Scalar, Values, Vector
     from symdyn.model.shapes import Shape
     from symdyn.runtime.module import Module
     from symdyn.viewer import View
@@ -63,7 +63,8 @@ class System:
     gravity      acceleration of gravity in the n-frame, m/s^2: 3 components, or 2 for a planar system
     planar       True: motion in the x-y plane, described by x, y, theta; default: gravity has 2 components
     parameters   if given, the only symbols that count as parameters, in this order; default: declared by use
-    frame        the n-frame as a ReferenceFrame of sympy.physics.mechanics, if there is one already: `system.frame`
+    frame, origin   the n-frame and its origin as a ReferenceFrame and a Point of sympy.physics.mechanics, if there are already:
+                 `system.frame`, `system.ground.origin`
 
     `ground` is the inertial n-frame (or, after `move_ground`, the moving base). `defaults` holds a number for each
     parameter, `initial` for coordinates, speeds, states and inputs, `duration` the usual time of simulation, `units`
@@ -80,7 +81,8 @@ class System:
     """
 
     def __init__(self, name: str, gravity: Vector | None = None, planar: bool | None = None,
-                 parameters: Sequence[sp.Symbol] | None = None, frame: Frame | None = None) -> None:
+                 parameters: Sequence[sp.Symbol] | None = None, frame: Frame | None = None,
+                 origin: MechanicsPoint | None = None) -> None:
         self.name = name
         self._faults = Faults()
         self._warned: set[str] = set()
@@ -88,11 +90,13 @@ class System:
             self._faults.append(f"planar is {shown(planar)}; pass True, False or None")
             planar = None
         frame = self._frame(frame, "the system's frame")
+        origin = self._origin(origin, "the system's origin")
         if planar is None:
             planar = length_of(gravity) == 2
         self.planar = planar
         self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar, frame)
-        self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)), frame)
+        self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)), frame,
+                           origin)
         self.declared = None if parameters is None else self._declared(parameters)
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
@@ -129,7 +133,7 @@ class System:
     # -- bodies and joints
 
     def add_body(self, name: str, mass: Scalar = 0, inertia: Inertia | None = None, com: Vector = ZERO,
-                 frame: Frame | None = None) -> Body:
+                 frame: Frame | None = None, origin: MechanicsPoint | None = None) -> Body:
         """Add a rigid body, or a point mass where no inertia is given.
 
         mass      kg
@@ -137,6 +141,8 @@ class System:
         com       centre of mass from the body's origin, body axes, m
         frame     the body axes as a ReferenceFrame of sympy.physics.mechanics, if there is one already: inertia may be a dyadic,
                   and com a vector, written in it. Later `body.frame` is the frame that vectors of the body are written in
+        origin    the body's origin as a Point of sympy.physics.mechanics, if there is one already: com, and later points of the
+                  body, may be Points that are located from it; `body.origin`
 
         >>> system = sd.System("plane", gravity=[0, -9.81])
         >>> system.add_body("cart", mass=2.0, com=[0.1, 0]).name
@@ -145,14 +151,17 @@ class System:
         where = f"body {shown(name)}"
         faults = self._faults
         frame = self._frame(frame, f"{where}: frame")
+        origin = self._origin(origin, f"{where}: origin")
         if inertia is None:
             matrix = sp.ImmutableMatrix(sp.zeros(3, 3))
         elif self.planar and not hasattr(inertia, "__len__") and not is_dyadic(inertia):
             matrix = sp.ImmutableMatrix(sp.diag(0, 0, faults.expression(inertia, f"{where}: inertia")))
         else:
             matrix = faults.matrix(inertia, f"{where}: inertia", frame)
+        if is_point(com):
+            com = faults.located(com, origin, f"{where}: com")
         body = Body(name, faults.expression(mass, f"{where}: mass"), matrix,
-                    faults.vector(com, f"{where}: com", self.planar, frame), frame)
+                    faults.vector(com, f"{where}: com", self.planar, frame), frame, origin)
         self.bodies.append(body)
         return body
 
@@ -297,7 +306,7 @@ class System:
         Matrix([[l*(-g*m*sin(q1) + F*cos(q1))]])
         """
         label = self._label(name, f"force_{len(self.loads) + 1}")
-        at = None if point is None else self._faults.vector(point, f"{label}: point", True, self._body(body))
+        at = None if point is None else self._faults.point(point, f"{label}: point", True, self._body(body))
         frame, axes = self._written_in(force, frame, label)
         self.loads.append(Force(body, self._faults.vector(force, label, self.planar, axes), at, frame, reaction, label))
 
@@ -346,8 +355,8 @@ class System:
         label = self._label(name, f"spring_{len(self.loads) + 1}")
         f = self._faults
         self.loads.append(SpringDamper(
-            body_a, body_b, f.vector(point_a, f"{label}: point_a", True, self._body(body_a)),
-            f.vector(point_b, f"{label}: point_b", True, self._body(body_b)),
+            body_a, body_b, f.point(point_a, f"{label}: point_a", True, self._body(body_a)),
+            f.point(point_b, f"{label}: point_b", True, self._body(body_b)),
             f.expression(stiffness, f"{label}: stiffness"), f.expression(damping, f"{label}: damping"),
             f.expression(length, f"{label}: length"), label))
 
@@ -365,7 +374,7 @@ class System:
         """
         label = self._label(name, f"force_{len(self.loads) + 1}")
         f = self._faults
-        points = [f.vector(ZERO if point is None else point, f"{label}: {what}", True, self._body(body))
+        points = [f.point(ZERO if point is None else point, f"{label}: {what}", True, self._body(body))
                   for point, what, body in ((point_a, "point_a", body_a), (point_b, "point_b", body_b))]
         self.loads.append(ForceBetween(body_a, body_b, f.expression(force, label), points[0], points[1], label))
 
@@ -417,7 +426,7 @@ class System:
         (1001,)
         """
         if isinstance(value, Point):
-            at = self._faults.vector(value.at, f"output {shown(name)}: point", True, self._body(value.body))
+            at = self._faults.point(value.at, f"output {shown(name)}: point", True, self._body(value.body))
             taken: Any = Point(value.body, tuple(at), value.quantity)
         elif hasattr(value, "__len__"):
             taken = self._faults.expressions(value, f"output {shown(name)}")
@@ -716,6 +725,14 @@ class System:
         """A ReferenceFrame that was given, or None."""
         try:
             return as_frame(given, what)
+        except ModelError as error:
+            self._faults.extend(error.faults)
+            return None
+
+    def _origin(self, given: Any, what: str) -> Any:
+        """A Point that was given, or None."""
+        try:
+            return as_point(given, what)
         except ModelError as error:
             self._faults.extend(error.faults)
             return None

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import sympy as sp
-from sympy.physics.mechanics import ReferenceFrame, inertia
+from sympy.physics.mechanics import Point, ReferenceFrame, inertia
 
 import symdyn as sd
 
@@ -40,6 +40,51 @@ def by_vectors() -> sd.System:
     s.add_spring_damper(s.ground, arm, point_a=N.y, point_b=l * A.x, stiffness=k)
     s.add_output("tip", sd.position(arm, l * A.x))
     return s
+
+
+def by_points() -> sd.System:
+    O, P = Point("O"), Point("P")
+    pivot, center = O.locatenew("pivot", N.x), P.locatenew("G", l * A.x)
+    s = sd.System("arm", gravity=-g * N.y, frame=N, origin=O)
+    arm = s.add_body("arm", mass=m, inertia=inertia(A, I, 2 * I, 3 * I, 0, 0, k), com=center, frame=A, origin=P)
+    s.add_joint(sd.Revolute("shoulder", s.ground, arm, q, axis=N.z, parent_point=pivot, child_point=P.locatenew("S", -l * A.x)))
+    s.add_force(arm, F * A.y, point=center)
+    s.add_force(arm, F * N.x)
+    s.add_torque(arm, 3 * N.z)
+    s.add_spring_damper(s.ground, arm, point_a=s.ground.origin.locatenew("hook", N.y), point_b=center, stiffness=k)
+    s.add_output("tip", sd.position(arm, center))
+    return s
+
+
+def test_points_stand_for_their_components() -> None:
+    points, components = by_points().embedding(), by_components().embedding()
+    for name in ("M_tilde", "k_tilde", "F_tilde", "energy", "output_tip", "reactions"):
+        assert points.explicit(name, simplify=False) == components.explicit(name, simplify=False), name
+    assert pickle.loads(pickle.dumps(by_points())).embedding().F_tilde == components.F_tilde
+    made = sd.System("arm")
+    arm = made.add_body("arm", mass=m, com=[l, 0, 0])
+    made.add_joint(sd.Revolute("shoulder", made.ground, arm, q))
+    made.add_force(arm, F * arm.frame.y, point=arm.origin.locatenew("P", l * arm.frame.x))
+    assert made.embedding().F_tilde == sp.Matrix([F * l])
+    assert sd.read_system(by_points().to_toml()).embedding().F_tilde == components.F_tilde
+
+
+@pytest.mark.parametrize(("describe", "message"), [
+    (lambda s, arm, P: s.add_force(arm, [1, 0, 0], point=P), "force_1: point is the SymPy point P, which is not located from arm "
+     r"origin, the body's origin; locate it from body\.origin"),
+    (lambda s, arm, P: s.add_force("nobody", [1, 0, 0], point=P), "of its body no origin is known here"),
+    (lambda s, arm, P: s.add_force(arm, P), "force_1 is P; pass a list"),
+    (lambda s, arm, P: s.add_force(arm, [1, 0, 0], point=arm.origin.locatenew("Q", l * B.x)), "in the frame B; here the frame"),
+    (lambda s, arm, P: s.add_body("other", mass=1, com=P), "body 'other': com is the SymPy point P, and of its body no origin"),
+    (lambda s, arm, P: s.add_body("other", origin=3), "body 'other': origin is 3; pass a Point"),
+])
+def test_points_that_are_not_known_are_rejected(describe: Callable[..., Any], message: str) -> None:
+    s = sd.System("arm")
+    arm = s.add_body("arm", mass=m, inertia=[I, I, I])
+    s.add_joint(sd.Revolute("shoulder", s.ground, arm, q))
+    describe(s, arm, Point("P"))
+    with pytest.raises(sd.ModelError, match=message):
+        s.embedding()
 
 
 def test_vectors_and_dyadics_stand_for_their_components() -> None:

@@ -71,8 +71,8 @@ class Joint:
         self.child = child
         self.faults = faults = Faults()
         where = f"joint {shown(name)}"
-        self.parent_point = faults.vector(parent_point, f"{where}: parent_point", True, parent)
-        self.child_point = faults.vector(child_point, f"{where}: child_point", True, child)
+        self.parent_point = faults.point(parent_point, f"{where}: parent_point", True, parent)
+        self.child_point = faults.point(child_point, f"{where}: child_point", True, child)
         self.parent_rotation = self._rotation(parent_rotation, "parent_rotation")
         self.child_rotation = self._rotation(child_rotation, "child_rotation")
         self.unnamed = coordinates is None
