@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,14 @@ from symdyn.errors import MissingExtra
 # What a file may be long, bytes; how many triangles a mesh in a picture has at most, and into how many cells it is divided first.
 LONGEST, TRIANGLES, _CELLS = 64 * 2**20, 800, 40
 FORMATS = ("stl", "obj", "dae")
+# The unit of lengths in COLLADA, m, which trimesh leaves to its callers.
+_UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']")
 Triangles = tuple[np.ndarray, np.ndarray]
 
 
 def loaded(path: Path) -> Triangles:
-    """Vertices (n, 3) and faces (m, 3) of a file. It alone is read, no material or texture that it names.
+    """Vertices (n, 3), m, and faces (m, 3) of a file. It alone is read, no material or texture that it names; of COLLADA in the
+    unit that it states, along its axes as they are.
 
     Raises ValueError with what is wrong with it, MissingExtra without trimesh.
     """
@@ -30,9 +34,12 @@ def loaded(path: Path) -> Triangles:
         raise ValueError(f"is of the format {kind or 'without an ending'}; read are {', '.join(FORMATS)}")
     if path.stat().st_size > LONGEST:
         raise ValueError(f"has {path.stat().st_size / 2**20:.0f} MiB; read are {LONGEST // 2**20} at most")
+    content = path.read_bytes()
     try:
-        found: Any = trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type=kind)
+        found: Any = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
         vertices, faces = np.array(found.vertices, dtype=float), np.array(found.faces, dtype=int)
+        stated = _UNIT.search(content) if kind == "dae" else None
+        vertices *= float(stated[1]) if stated else 1.0
     except Exception as error:  # of any kind: parsers of others
         raise ValueError(f"cannot be read as {kind} ({type(error).__name__}: {str(error)[:80]})") from None
     if not len(faces) or not np.isfinite(vertices).all():

@@ -215,3 +215,20 @@ def test_without_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtra, match=r"reading an MJCF needs the package mujoco: pip install 'symdyn\[mjcf\]'"):
         sd.read_mjcf(pendulum())
+
+
+def test_geoms_are_drawn_where_mujoco_has_them() -> None:
+    """Turned solids, and a mesh, which MuJoCo moves to its principal axes; hidden groups and clear geoms are left out."""
+    text = """<mujoco><asset><mesh name="wedge" vertex="0 0 0  1 0 0  0 2 0  0 0 3"/></asset><worldbody>
+      <body name="b" pos="1 2 3"><joint name="j"/>
+      <geom type="box" size="0.1 0.2 0.3" pos="1 0 0" euler="0 0 90" rgba="1 0.5 0 1"/>
+      <geom type="capsule" size="0.1 0.5" pos="0 1 0"/><geom type="cylinder" size="0.2 0.4" pos="0 0 1" euler="90 0 0"/>
+      <geom type="ellipsoid" size="0.1 0.2 0.3"/><geom type="mesh" mesh="wedge" pos="0 0 5"/>
+      <geom size="9" group="3"/><geom size="9" rgba="1 1 1 0"/></body></worldbody></mujoco>"""
+    shapes = sd.read_mjcf(text, visuals=True).check().shapes
+    assert len(shapes) == 5 and shapes[0].color == [1.0, 0.5, 0.0]
+    ends = [(np.min(s.about["vertices"], axis=0), np.max(s.about["vertices"], axis=0)) for s in shapes]
+    expected = [((0.8, -0.1, -0.3), (1.2, 0.1, 0.3)), ((-0.1, 0.9, -0.6), (0.1, 1.1, 0.6)), ((-0.2, -0.4, 0.8), (0.2, 0.4, 1.2)),
+                ((-0.1, -0.2, -0.3), (0.1, 0.2, 0.3)), ((0, 0, 5), (1, 2, 8))]
+    for (low, high), wanted in zip(ends, expected, strict=True):
+        np.testing.assert_allclose([low, high], wanted, atol=1e-6)

@@ -175,6 +175,18 @@ def test_meshes_are_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "arm.png").stat().st_size > 5000
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("", 1.0), ('<unit name="millimeter" meter="0.001"/>', 0.001)])
+def test_collada_has_the_unit_that_it_states(tmp_path: Path, unit: str, factor: float) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed; run: pip install 'symdyn[meshes]'")
+    pytest.importorskip("collada", reason="pycollada is not installed; run: pip install 'symdyn[meshes]'")
+    text = trimesh.creation.box(extents=[1, 2, 3]).export(file_type="dae")
+    written = text.decode() if isinstance(text, bytes) else text
+    (tmp_path / "box.dae").write_text(written.replace("<up_axis>", f"{unit}<up_axis>"))
+    shape, = sd.read_urdf(saved(tmp_path, visual('<mesh filename="box.dae"/>')), visuals=True).shapes
+    vertices = np.array(shape.about["vertices"])
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), factor * np.array([1, 2, 3]), rtol=1e-12)
+
+
 def visual(geometry: str) -> str:
     return robot(link("a", f"<visual><origin xyz='0 0 1'/><geometry>{geometry}</geometry></visual>"))
 
