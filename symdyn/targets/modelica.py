@@ -82,6 +82,15 @@ class Sample(NamedTuple):
     claims: tuple[tuple[str, str], ...]
 
 
+class _Violation(NamedTuple):
+    """What the largest of some residuals is called, with its unit."""
+
+    name: str
+    unit: str
+    about: str
+    residuals: tuple[str, ...]
+
+
 def write_modelica(module: Module, folder: Any, *, q: Any = None, u: Any = None, z: Any = None, params: Any = None,
                    inputs: Any = None) -> list[Path]:
     """See Module.to_modelica."""
@@ -157,7 +166,10 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
         "clauses": _clauses(metadata, x, events, flat.results.get("event_resets", ())),
         "watches": [(" and ".join(_within(w, value)), _message(w.message, value))
                     for w, value in zip(metadata.watches, flat.results.get("watches", ()), strict=True) if _within(w, value)],
-        "violation": residuals[:len(residuals) // 2], "length": flat.results.get("length", ("1",))[0], "violated": VIOLATED,
+        "violations": [v for v in (
+            _Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),
+            _Violation("violation_rate", "m/s", "rate of a violation", _moving(residuals[len(residuals) // 2:]))) if v.residuals],
+        "length": flat.results.get("length", ("1",))[0], "violated": VIOLATED,
         "kernels": sorted(kernels), "user_texts": user_texts,
         "own": [f for f in _OWN_FUNCTIONS if f"{f}(" in body],
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
@@ -173,6 +185,11 @@ def variable_name(name: str, taken: set[str]) -> str:
         found += "_"
     taken.add(found)
     return found
+
+
+def _moving(residuals: Sequence[str]) -> tuple[str, ...]:
+    """Those that are not zero all the time, as the positions of rows of speeds are."""
+    return tuple(r for r in residuals if r != "0.0")
 
 
 def _check_kernels(owner: str, kernels: set[str]) -> None:

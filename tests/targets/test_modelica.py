@@ -193,6 +193,13 @@ def test_mechanisms_that_a_model_cannot_have_are_rejected(tmp_path: Path) -> Non
         bouncing.embedding().compile(backend="numpy").to_modelica(tmp_path)
 
 
+def test_violations_of_constraints_of_speeds_are_outputs(tmp_path: Path) -> None:
+    skate, _ = written(sd.systems.get("skate").compile(backend="numpy"), tmp_path)
+    assert "output Real violation_rate(unit=\"m/s\")" in skate and "output Real violation(" not in skate
+    bars, _ = written(sd.systems.four_bar().augmented().compile(backend="numpy"), tmp_path)
+    assert bars.count("AssertionLevel.warning") == 2 and "output Real violation(unit=\"m\")" in bars
+
+
 def test_ranges_of_validity_become_warnings(tmp_path: Path) -> None:
     model, _ = written(sd.systems.get("land_wind_turbine").compile(backend="numpy"), tmp_path)
     assert model.count("AssertionLevel.warning") >= 1 and "inf" not in re.sub(r"\"[^\"]*\"", "", model)
