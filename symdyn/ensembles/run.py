@@ -88,7 +88,7 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
 
     From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
     that fails has no numbers in its row, and is listed in `failures`. Warnings of single motions are not given, but one
-    SimulationWarning tells of members whose derivatives are outcomes and were warned of. Returns an Ensemble. Raises
+    SimulationWarning reports members whose derivatives are outcomes and were warned of. Returns an Ensemble. Raises
     ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an executor died or
     the disk is full: what was done is kept, if there is a path.
 

@@ -370,7 +370,8 @@ static int symdyn_jump_columns(
 #endif
 #if SYMDYN_KEEPS_RESETS
     for (int i = 0; i < N; i++) y[i] = after[i];
-    if (symdyn_event[first].resets && (failure = symdyn_keep_columns(run, t, x, y, run->events.asked, then, later))) return failure;
+    if (symdyn_event[first].resets && (failure = symdyn_keep_columns(run, t, x, y, run->events.asked, then, later)))
+        return failure;
 #endif
     for (int j = 0; j < SYMDYN_COLUMNS; j++)
         for (int i = 0; i < N; i++) after[N * (j + 1) + i] = y[N * (j + 1) + i] - then[i] * later[j];
@@ -508,10 +509,11 @@ static int symdyn_in_order(
 }
 
 // The same as symdyn_jump_columns where several events fire, n of them, which have an effect: columns along which they come at
-// different times are those of one event after the other, if the result is the same in any order; else they are those of one time,
-// and `ordered` is 0. Orders that are compared: by number, the reverse, and with two neighbours exchanged. Returns 0 or a failure.
+// different times are those of one event after the other, if the result is the same in any order; else they are those of one
+// time, and `ordered` is 0. Orders that are compared: by number, the reverse, and with two neighbours exchanged. Returns 0 or a
+// failure.
 static int symdyn_several_columns(symdyn_run *run, double t, const double *x, double *after, const double *slope,
-                                  const double *then, const int *events, int n, int *ordered) {
+    const double *then, const int *events, int n, int *ordered) {
     enum { N = SYMDYN_STATE };
     double later[SYMDYN_N_EVENTS][SYMDYN_COLUMNS], one[SYMDYN_NX], other[SYMDYN_NX];
     int failure, apart[SYMDYN_COLUMNS], any = 0, agree[SYMDYN_COLUMNS], clear;
@@ -557,8 +559,8 @@ static int symdyn_several_columns(symdyn_run *run, double t, const double *x, do
     return 0;
 }
 
-// The columns of sensitivities after the events at (t, x), behind the state after them: each comes earlier by what its quantity is
-// moved by over its rate. changed: whether they differ from those before. Returns 0 or a failure.
+// The columns of sensitivities after the events at (t, x), behind the state after them: each comes earlier by what its quantity
+// is moved by over its rate. changed: whether they differ from those before. Returns 0 or a failure.
 static int symdyn_event_columns(symdyn_run *run, double t, const double *x, double *after, int *changed) {
     enum { N = SYMDYN_STATE };
     double slope[SYMDYN_NX], then[SYMDYN_NX], y[SYMDYN_NX];
