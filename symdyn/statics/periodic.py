@@ -92,7 +92,9 @@ class PeriodicMotion:
         return bool((sizes < 1 - error).all())
 
     def simulate(self, n: int = 201) -> Solution:
-        """The motion over a period, at n times."""
+        """The motion over a period, at n times. Raises ArgumentError for another number than a whole one from 2 on."""
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 2:
+            raise ArgumentError(f"{self.module.name}: a period was asked for at {shown(n)} times; pass a whole number from 2 on")
         return self._problem.solution(self.x, self.period, n)
 
     def follow(self, name: Key, values: Sequence[float]) -> list[PeriodicMotion]:
@@ -143,6 +145,10 @@ class PeriodicMotion:
                 f"{', ...' if len(self.multipliers) > 4 else ''}>")
 
 
+# The loosest tolerance of the motions.
+LOOSEST = 1e-4
+
+
 def periodic(module: Module, period: Any, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: float = 0.0,
              inputs: Any = None, advance: Any = None, cyclic: Any = None, exchange: Any = None, rtol: float = 1e-10,
              method: str = "dop853") -> PeriodicMotion:
@@ -153,6 +159,9 @@ def periodic(module: Module, period: Any, q: Any = None, u: Any = None, params: 
         raise ArgumentError(f"{module.name}: the period must be a positive number of seconds, found {shown(period)}; where the "
                             "time does not appear in the equations it is a guess")
     p = real_parameters(module, params)
+    if not number_of(rtol, module.name, "rtol must be a number") <= LOOSEST:
+        raise ArgumentError(f"{module.name}: rtol = {shown(rtol)} is too loose for a periodic motion: whether it comes back, and "
+                            f"its multipliers, are as exact as the motion; pass {LOOSEST:g} or less")
     turns = some(advance, list(metadata.x), "advance", module.name)
     begin = number_of(t, module.name, "t must be a finite time")
     arguments = module.unit("rhs").metadata.arguments
@@ -184,6 +193,8 @@ def _exchanged(module: Module, given: Any) -> list[int]:
     """The order of the state with pairs of coordinates exchanged, and with them their speeds."""
     names = list(module.metadata.x)
     order = list(range(len(names)))
+    if given is not None and not isinstance(given, (list, tuple)):
+        raise ArgumentError(f"{module.name}: exchange is {shown(given)}; pass a list of pairs, such as [('left', 'right')]")
     for pair in given or ():
         two = _names(module, pair, "a pair to exchange")
         if len(two) != 2 or two[0] == two[1]:
@@ -298,6 +309,11 @@ class _Problem:
         """The gap of a motion that counts as closed."""
         return CLOSED * self.rtol * _size(x, end)
 
+    def atol(self, x: np.ndarray) -> float | None:
+        """Tolerated error of small motions, by their size; None: that of others."""
+        size = _size(x, x)
+        return self.rtol * size if 0 < size < 1 else None
+
     def nearer(self, here: _Shot, step: np.ndarray, scale: float) -> _Shot | None:
         """A motion with a smaller gap on the way of a step, None if there is none."""
         part = min(1.0, LARGEST * here.period / max(abs(step[-1]), 1e-300))
@@ -365,16 +381,18 @@ class _Problem:
         n = 0 if fixed else at.basis.shape[1]
         basis, moved = at.basis[:, :n], at.moved[:, :n]
         columns = [moved - basis]
+        small = min(1.0, _size(at.x, at.end) or 1.0)  # the size of a small motion, in which its changes are measured
+        right = right / small
         if self.free:  # and the start does not slide along the motion
             along = basis.T @ at.rate
-            columns.append(at.late[:, None])
+            columns.append(at.late[:, None] / small)
             size = max(float(np.linalg.norm(along)), 1e-300)
             matrix = np.vstack([np.hstack(columns), np.append(along / size, 0.0)])
             right = np.append(right, 0.0)
         else:
             matrix = columns[0]
         found = np.linalg.lstsq(matrix, right, rcond=left_out)[0]
-        return np.append(basis @ found[:n], found[n] if self.free else 0.0)
+        return np.append(small * (basis @ found[:n]), found[n] if self.free else 0.0)
 
     def derivative(self, x: np.ndarray, period: float, name: str) -> np.ndarray:
         """Derivatives of the start and of the period by a parameter, (n_x + 1,)."""
@@ -402,7 +420,8 @@ class _Problem:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", SimulationWarning)
             run = self.module.simulate(times, x[:sizes.q], x[sizes.q:sizes.q + sizes.u], self.p, z=x[sizes.q + sizes.u:],
-                                       inputs=self.inputs, rtol=self.rtol, method=self.method, sensitivities=by)
+                                       inputs=self.inputs, rtol=self.rtol, atol=self.atol(x), method=self.method,
+                                       sensitivities=by)
         if not run.success or run.t[-1] != times[-1]:
             raise EvaluationError(f"{self.module.name}: the motion does not last for a period: {run.message}")
         for other in caught:
@@ -413,7 +432,7 @@ class _Problem:
 
 
 def _size(x: np.ndarray, end: np.ndarray) -> float:
-    return max(float(np.abs(x).max()), float(np.abs(end).max()), 1e-3)
+    return max(float(np.abs(x).max()), float(np.abs(end).max()))
 
 
 @dataclass(frozen=True)

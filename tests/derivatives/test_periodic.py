@@ -344,3 +344,29 @@ def test_multipliers_that_lack_a_jump_are_warned_of() -> None:
     expected = np.linalg.eigvals(np.column_stack([(late - early) / (2 * h) for early, late in ends]))
     np.testing.assert_allclose(np.sort_complex(right.multipliers), np.sort_complex(expected), atol=1e-5)
     assert np.abs(np.sort_complex(wrong.multipliers) - np.sort_complex(expected)).max() > 1e-3
+
+
+@pytest.mark.parametrize("amplitude", [1e-6, 1e-9, 1e-12])
+def test_small_motions(amplitude: float) -> None:
+    """Van der Pol's cycle of another size has the published period and the same multipliers."""
+    q = sd.coordinates("q")
+    system = sd.System("small")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+    system.add_joint_force(slide, (1 - (q / amplitude) ** 2) * q.dot - q)
+    found = system.compile().periodic(6.0, q=[1.5 * amplitude], u=[0])
+    assert found.period == pytest.approx(6.6632868593231, abs=1e-10)
+    assert found.x[0] / amplitude == pytest.approx(2.00861986087, rel=1e-8)
+    assert np.abs(found.multipliers) == pytest.approx([1, 8.5969506e-4], rel=1e-6)
+
+
+def test_arguments_of_periodic_motions() -> None:
+    module = sd.systems.pendulum().compile()
+    with pytest.raises(ArgumentError, match=r"exchange is 3; pass a list of pairs"):
+        module.periodic(2.0, q=[0.5], exchange=3)
+    with pytest.raises(ArgumentError, match=r"rtol = 0\.01 is too loose for a periodic motion"):
+        module.periodic(2.0, q=[0.5], rtol=1e-2)
+    found = module.periodic(2.0, q=[0.5])
+    for n in (1, -3, "a", True, 2.5):
+        with pytest.raises(ArgumentError, match=r"a period was asked for at .* times; pass a whole number from 2 on"):
+            found.simulate(n)  # type: ignore[arg-type]
