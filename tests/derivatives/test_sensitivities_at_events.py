@@ -12,7 +12,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import SimulationWarning
+from symdyn.errors import EvaluationError, SimulationWarning
 from symdyn.runtime.building.compiler import find_compiler
 from tests.derivatives.test_sensitivities import derivatives
 
@@ -124,6 +124,57 @@ def test_jump_without_an_event() -> None:
     with pytest.warns(SimulationWarning, match=r"may jump where x_dot passes zero \(sign\(x_dot\)\).*the sensitivities lack "
                                                r"their jump; add an event, system.add_event\(name, x_dot\)"):
         block(event=False).simulate((0, 1), sensitivities=["mu"])
+
+
+@cache
+def touching() -> Any:
+    """A swing x = u sin(t) that is turned back at the height h."""
+    x = sd.coordinates("x")
+    h = sd.parameters("h")
+    system = sd.System("touching")
+    body = system.add_body("body", mass=1)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, x, axis=[1, 0]))
+    system.add_joint_force(joint, -x)
+    system.add_event("top", x - h, reset={x.dot: -x.dot / 2})
+    system.add_event("passes", x - h)  # without effect
+    system.defaults, system.initial = {h: 1.0}, {x: 0}
+    return system.compile()
+
+
+def turned(t: Any, h: Any, speed: Any) -> Any:
+    """Half of the speed is left at h; x = h cos(t - t1) - v/2 sin(t - t1) then."""
+    begin = mp.asin(h / speed)
+    return h * mp.cos(t - begin) - mp.sqrt(speed**2 - h**2) / 2 * mp.sin(t - begin)
+
+
+@pytest.mark.parametrize("speed", [1.0, 1 + 1e-14, 1 - 1e-14, 1 + 1e-10])
+def test_events_that_graze(speed: float) -> None:
+    """Whether x reaches h is within the tolerances: one rule for both ways."""
+    without = r"touching: the quantity of the event top vanishes at t = 1.57\d* s without a rate that the tolerances resolve, so"
+    with pytest.warns(SimulationWarning, match=without):
+        run = touching().simulate(np.array([0, 3.0]), u=[speed], rtol=1e-10, sensitivities=["h"])
+    assert len(run.events["top"].t) == 1
+    with pytest.raises(EvaluationError, match=without):
+        touching().gradient(sd.Loss(end=sp.Symbol("x")), ["h"], (0, 3), u=[speed], rtol=1e-10)
+
+
+@pytest.mark.parametrize(("speed", "rtol"), [(1 + 1e-8, 1e-12), (1 + 1e-6, 1e-10), (1 + 1e-4, 1e-8), (2.0, 1e-6)])
+def test_events_that_nearly_graze(speed: float, rtol: float) -> None:
+    """Derivatives are as exact as the tolerances over what the quantity goes beyond zero by."""
+    exact = derivatives(turned, [3.0], {"h": 1.0, "u": speed})[0, 0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = touching().simulate(np.array([0, 3.0]), u=[speed], rtol=rtol, sensitivities=["h"])
+        found = touching().gradient(sd.Loss(end=sp.Symbol("x")), ["h"], (0, 3), u=[speed], rtol=rtol)
+    assert run.sensitivity["h"][-1, 0] == pytest.approx(exact, rel=10 * rtol / (speed - 1) + 1e-9)
+    assert found["h"] == pytest.approx(exact, rel=10 * rtol / (speed - 1) + 1e-9)
+
+
+def test_events_without_effect_may_graze() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = touching().simulate((0, 3), u=[1.0], rtol=1e-10, events=["passes"], sensitivities=["x_dot(0)"])
+    np.testing.assert_allclose(run.sensitivity["x_dot(0)"][:, 0], np.sin(run.t), atol=1e-9)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Sensitivities and gradients across several events at one time, against closed forms of each, and of one event in their place."""
+"""Sensitivities and gradients across several events at one time, against closed forms of each, and one event in their place."""
 
 from __future__ import annotations
 
@@ -61,6 +61,29 @@ def test_each_of_three_balls_bounces_at_its_own_time(method: str) -> None:
         assert np.abs(run.sensitivity.of(f"y{k + 1}") - own).max() < 1e-9
 
 
+@pytest.mark.parametrize("method", ["dop853", "bs54"])
+def test_gradients_of_three_balls(method: str) -> None:
+    exact, y = derivatives(lambda *a: bounced(*a)[0], [1.9], AT)[0], sd.coordinates("y1 y2 y3")
+    height, area = derivatives(lambda *a: bounced(*a)[0], [1.9], AT)[0, 2], derivatives(fallen, [1.9], AT)[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        end = three().gradient(sd.Loss(end=y[0] + 2 * y[1]), [*AT, "y2(0)", "y3(0)"], (0, 1.9), rtol=1e-11, method=method)
+        whole = three().gradient(sd.Loss(integral=y[0] * 3 + y[1]), [*AT, "y2(0)", "y3(0)"], (0, 1.9), rtol=1e-11, method=method)
+    np.testing.assert_allclose(end.array, [*(3 * exact[:2]), height, 2 * height, 0], atol=1e-9)
+    np.testing.assert_allclose(whole.array, [*(4 * area[:2]), 3 * area[2], area[2], 0], atol=1e-9)
+
+
+def fallen(t: Any, g: Any, e: Any, height: Any) -> Any:
+    """The integral of the height of a ball."""
+    begin, speed = mp.sqrt(2 * height / g), mp.sqrt(2 * g * height)
+    total = height * begin - g * begin**3 / 6
+    while begin < t:
+        speed = e * speed
+        length = min(2 * speed / g, t - begin)
+        total, begin = total + speed * length**2 / 2 - g * length**3 / 6, begin + 2 * speed / g
+    return total
+
+
 def test_each_of_two_blocks_turns_at_its_own_time() -> None:
     """The right-hand side jumps without a reset, at each event in its own entry."""
     mu, spring, g = sd.parameters("mu k g", positive=True)
@@ -80,6 +103,12 @@ def test_each_of_two_blocks_turns_at_its_own_time() -> None:
     exact = derivatives(slid, times, at)
     np.testing.assert_allclose(run.sensitivity.of("x1"), np.column_stack([exact, 0 * times]), atol=1e-8)
     np.testing.assert_allclose(run.sensitivity.of("x2"), np.column_stack([exact[:, :2], 0 * times, exact[:, 2]]), atol=1e-8)
+    loss = sd.Loss(end=sp.Symbol("x1") + 2 * sp.Symbol("x2"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gradient = module.gradient(loss, [*at, "x2(0)"], (0, 2.9), rtol=1e-11)
+    exact = derivatives(slid, [2.9], at)[0]
+    np.testing.assert_allclose(gradient.array, [*(3 * exact[:2]), exact[2], 2 * exact[2]], atol=1e-8)
 
 
 @cache
@@ -93,6 +122,8 @@ def test_order_that_matters_is_warned_of() -> None:
     with pytest.warns(SimulationWarning, match=r"the events hit_y1, hit_y2 happen at one time, t = 0.4515\d* s, and what they do "
                                                r"together depends on their order.*; take another start, or one event with all"):
         entangled().simulate((0, 0.6), rtol=1e-11, sensitivities=["y1(0)"])
+    with pytest.warns(SimulationWarning, match=r"the events hit_y1, hit_y2 happen at one time, t = 0.4515\d* s, and what they"):
+        entangled().gradient(sd.Loss(end=sp.Symbol("y1")), ["y1(0)"], (0, 0.6))
     h = 1e-4
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -121,7 +152,11 @@ def test_events_of_one_quantity_are_one() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         runs = [module.simulate(np.linspace(0, 2, 5), rtol=1e-11, sensitivities=["g", "e", "y(0)"]) for module in modules]
+        losses = [module.gradient(sd.Loss(end=sp.Symbol("n") + sp.Symbol("y")), ["g", "e", "y(0)"], (0, 2), rtol=1e-11)
+                  for module in modules]
     np.testing.assert_allclose(runs[0].sensitivity.matrix, runs[1].sensitivity.matrix, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(losses[0].array, losses[1].array, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(losses[0].array, runs[0].sensitivity.matrix[-1, [0, 2]].sum(axis=0), rtol=1e-8)
 
 
 @cache

@@ -10,16 +10,19 @@ Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section I
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.at_breaks import Breaks
-from symdyn.runtime.integrating.carried_on import CarriedOn
+from symdyn.runtime.integrating.events import Happened, entangled
+from symdyn.runtime.integrating.grazing import JUMPS, grazing, without_rate
+from symdyn.runtime.integrating.jumps import Field, Jump, Several
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.way_back import Way
@@ -37,12 +40,8 @@ SHORT, MOST, TRIES = 1e-2, 0.2, 8
 ITERATIONS, ENOUGH = 60, 4e-16
 # Steps to one side of an event at which the slope there is evaluated, of a bridge.
 BESIDE = 1e-3
-# A quantity before an event that is so many times what its rate there gives grazes zero.
-GRAZES = 1e4
 # Relative change that iterations may end with.
 LEFT = 1e-12
-# Relative difference of slopes from which on the right-hand side jumps.
-JUMPS = 1e-7
 
 
 class Moment(NamedTuple):
@@ -77,7 +76,7 @@ def _matter(module: Module, request: Request, outcome: Outcome, t: float, events
         return True
     x = next(one.before for one in outcome.happened if one.t == t)[:request.n_state]
     inputs = request.inputs if outcome.record is None else request.inputs.recorded(outcome.record)
-    field = _Field(module, replace(request, inputs=inputs))
+    field = Field(module, replace(request, inputs=inputs))
     length = SHORT * MOST * _spacing(outcome, t, request)
     before, after = field.one_sided(t, x, -length), field.one_sided(t, x, length)
     return bool((np.abs(after - before) > JUMPS * (np.abs(after) + np.abs(before))).any())
@@ -89,28 +88,6 @@ def _spacing(outcome: Outcome, t: float, request: Request) -> float:
     before = outcome.t[direction * outcome.t < direction * t]
     steps = np.diff(np.append(before[-3:], t)) if len(before) else np.array([t - request.span[0]])
     return float(steps[np.argmax(np.abs(steps))])
-
-
-class _Field:
-    """The right-hand side of a piece in Python."""
-
-    def __init__(self, module: Module, request: Request) -> None:
-        self.module, self.p, self.given = module, request.p, request.inputs
-
-    def inputs(self, t: float, x: np.ndarray) -> np.ndarray:
-        return self.given.rows(np.array([t]), x[None, :])[0]
-
-    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
-        return self.module.evaluate("rhs", t, x, self.p, self.inputs(t, x))
-
-    def one_sided(self, t: float, x: np.ndarray, step: float) -> np.ndarray:
-        """The slope at a state as it is on one side of it, to second order in the step, which has a sign."""
-        slope = self(t, x)
-        for _ in range(3):  # the first ones go over to the side
-            far = slope = self(t + 2 * step, x + 2 * step * slope)
-        for _ in range(3):
-            slope = self(t + step, x + step * slope)
-        return 2 * slope - far
 
 
 @dataclass
@@ -127,7 +104,7 @@ class Bridge:
     @classmethod
     def over(cls, way: Way, t: float, x: np.ndarray, length: float, side: float = 0.0) -> Bridge:
         """From a state; side: a step that leads to the side of the state where it goes on, 0: it is there already."""
-        field = _Field(way.module, way.request)
+        field = Field(way.module, way.request)
         slopes = np.tile(field.one_sided(t, x, side) if side else field(t, x), (2, 1))
         for _ in range(ITERATIONS):
             stages = x + length * (A @ slopes)
@@ -170,108 +147,6 @@ def _converged(module: Module, t: float, change: float, values: np.ndarray) -> N
     if not change <= LEFT * np.abs(values).max():
         raise EvaluationError(f"{module.name}: the step up to an event near t = {t:.9g} s is not computed, since the motion is "
                               "stiff or irregular there; take simulate(..., sensitivities=[...])")
-
-
-@dataclass
-class Jump:
-    """Events at a time: states and slopes before and after, None after an end; which of them sets the time; step: a short one,
-    by which either side is looked at.
-
-    The change of the time by those of the state before it and of the others is -(by_x x' + by p')/rate.
-    """
-
-    way: Way
-    t: float
-    x: np.ndarray
-    slope: np.ndarray
-    events: tuple[int, ...]
-    first: int
-    step: float
-    after: np.ndarray | None = None
-    slope_after: np.ndarray | None = None
-    reset: CarriedOn | None = None
-
-    def back(self, integral: Integral | None, weights: np.ndarray, end: float = 0.0) -> float:
-        """Carry weights of the state after it to that before, in place; end: what the loss gains by time, where the motion ends
-        here."""
-        n_x = len(self.x)
-        g_x, _, g_others = self._derivatives("events")
-        later, rate = end, self.rate()
-        if integral is not None:
-            later += self._cost(integral, self.x, self.slope, -self.step)
-        if integral is not None and self.after is not None and self.slope_after is not None:
-            later -= self._cost(integral, self.after, self.slope_after, self.step)
-        if self.after is None:
-            later += float(weights[:n_x] @ self.slope)
-        else:
-            assert self.slope_after is not None
-            moved = weights[:n_x].copy()
-            later -= float(moved @ self.slope_after)
-            by_x, by_t, by_others = self._through_resets()
-            weights[:n_x] = moved @ by_x
-            weights[n_x:] += moved @ by_others
-            later += float(moved @ by_t) + float(weights[:n_x] @ self.slope)
-        weights[:n_x] -= later / rate * g_x[self.first]
-        weights[n_x:] -= later / rate * g_others[self.first]
-        return 0.0
-
-    def rate(self) -> float:
-        """Of the quantity that sets the time, along the motion before it."""
-        g_x, g_t, _ = self._derivatives("events")
-        return float(g_t[self.first] + g_x[self.first] @ self.slope)
-
-    def _through_resets(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of the state after resets by that before, by the time, and by what is carried."""
-        n_x = len(self.x)
-        by_x, by_t, by_others = np.eye(n_x), np.zeros(n_x), np.zeros((n_x, len(self.way.carried)))
-        places, rows = self.resets()
-        if places:
-            by_x[places], by_t[places], by_others[places] = (d[rows] for d in self._derivatives("event_resets"))
-        if self.reset is None or self.slope_after is None:
-            return by_x, by_t, by_others
-        whole = self.reset.carried(self.way, np.column_stack([by_x, by_t, by_others]), self.slope_after)
-        return whole[:, :n_x], whole[:, n_x], whole[:, n_x + 1:]
-
-    def go_on(self, after: np.ndarray) -> np.ndarray:
-        """The state after the resets; after: that before them, which is changed."""
-        module, p, places = self.way.module, self.way.request.p, self.resets()[0]
-        if not places:
-            return after
-        values = module.evaluate("event_resets", self.t, self.x, p, _Field(module, self.way.request).inputs(self.t, self.x))
-        after[places] = values[self.resets()[1]]
-        if module.metadata.constraints and any(place < module.metadata.sizes.q + module.metadata.sizes.u for place in places):
-            self.reset = CarriedOn.of(module, self.t, after, p, places)
-            return self.reset.after
-        return after
-
-    def resets(self) -> tuple[list[int], list[int]]:
-        """Entries of the state that are reset, and their rows in the function of all resets; the last reset of one counts."""
-        found, row = {}, 0
-        for k, record in enumerate(self.way.module.metadata.events):
-            for place in record.reset:
-                if k in self.events:
-                    found[place] = row
-                row += 1
-        return list(found), list(found.values())
-
-    def _cost(self, integral: Integral, x: np.ndarray, slope: np.ndarray, step: float) -> float:
-        """The integrand as it is on one side of a state, where it may jump with the event."""
-        steps = step * np.array([1.0, 2.0])
-        t, states = self.t + steps, x + steps[:, None] * slope
-        near, far = integral(t, states, self.way.request.inputs.rows(t, states)).values
-        return float(2 * near - far)
-
-    def _derivatives(self, of: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a function by the state before, by the time, and by what is carried."""
-        module, request, metadata = self.way.module, self.way.request, self.way.module.metadata
-        inputs = request.inputs.rows(np.array([self.t]), self.x[None, :])[0]
-        J: Any = module.jacobian(self.t, self.x, request.p, inputs, ["x", "t", "params", "inputs"], of)
-        known = dict(zip((*metadata.parameters, *metadata.inputs), np.hstack([J.params, J.inputs]).T, strict=True))
-        others = np.array([known[name] for name in self.way.carried]).reshape(len(self.way.carried), len(J.x)).T
-        rows = np.hstack([J.x, others])
-        for row in rows:
-            self.way.feedback.fold(self.t, self.x, row)
-        return rows[:, :len(self.x)], J.t[:, 0], rows[:, len(self.x):]
 
 
 @dataclass
@@ -387,13 +262,9 @@ class Chain:
         self.pieces.append(bridge)
         self.n_steps += 1
         t, x = at + bridge.length, bridge.end
-        field = _Field(self.module, way.request)
+        field = Field(self.module, way.request)
         jump = Jump(way, t, x, field.one_sided(t, x, -BESIDE * bridge.length), cut.events, first, BESIDE * bridge.length)
-        before = self.module.evaluate("events", bridge.t, bridge.x, self.request.p, field.inputs(bridge.t, bridge.x))[first]
-        if abs(before) > GRAZES * abs(jump.rate() * bridge.length):
-            raise EvaluationError(f"{self.module.name}: the quantity of the event {records[first].name} vanishes at t = {t:.9g} "
-                                  "s without a rate, so that its time has no derivative; take another quantity, or events=[...] "
-                                  "without it")
+        self._demand_rates(jump, (first,))
         self.pieces.append(jump)
         if any(records[k].stop for k in cut.events):
             return t, x, True
@@ -401,15 +272,39 @@ class Chain:
         after = jump.go_on(x.copy())
         length = min(bridge.length, MOST * (later - t), key=abs)
         jump.after, jump.slope_after = after, field.one_sided(t, after, BESIDE * length)
+        if len(cut.events) > 1:
+            self._several(jump, BESIDE * (length or bridge.length))
         if not length:
             return t, after, False
         bridge = Bridge.over(way, t, after, length, BESIDE * length)
         self.pieces.append(bridge)
         return t + length, bridge.end, False
 
+    def _demand_rates(self, jump: Jump, events: tuple[int, ...]) -> None:
+        """Raises EvaluationError where one of the events grazes."""
+        n, size = len(events), np.maximum(np.abs(self.outcome.x).max(axis=0), np.abs(jump.x))
+        graze = grazing(self.module, jump.way.request, np.full(n, jump.t), np.tile(jump.x, (n, 1)), np.array(events), size)
+        if graze.any():
+            raise EvaluationError(without_rate(self.module, events[int(graze.argmax())], jump.t))
+
+    def _several(self, jump: Jump, side: float) -> None:
+        """Take the latest piece, of several events at one time, for those of each of them."""
+        several = Several(jump, side)
+        self._demand_rates(jump, several.events or (jump.first,))
+        jumps = several.in_turn()
+        if jumps:
+            self.pieces[-1:] = jumps
+            return
+        records = self.module.metadata.events
+        jump.events = several.events or jump.events
+        jump.first = next((k for k in jump.events if records[k].reset), jump.events[-1])
+        if jumps is None:
+            happened = [Happened(k, jump.t, jump.x, jump.x) for k in jump.events]
+            warnings.warn(entangled(self.module, happened, [jump.t]), SimulationWarning, stacklevel=6)
+
     def _to_event(self, way: Way, t: float, x: np.ndarray, length: float, first: int) -> Bridge | None:
         """The bridge to where the quantity of an event vanishes, by the secant method; None if it is not found."""
-        field = _Field(self.module, way.request)
+        field = Field(self.module, way.request)
 
         def tried(length: float) -> tuple[Bridge, float]:
             bridge = Bridge.over(way, t, x, length)

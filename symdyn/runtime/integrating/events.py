@@ -122,15 +122,16 @@ def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: floa
 
 
 def entangled(module: Module, happened: Sequence[Happened], times: Sequence[float]) -> str:
-    """What to warn of where derivatives across events at one time, the first of these times, depend on their order; "" without."""
+    """What to warn of where derivatives across events at one time, the first of these times, depend on their order; "" where none
+    do."""
     if not times:
         return ""
     there = [module.metadata.events[one.event] for one in happened if one.t == times[0]]
     resetting = [event for event in there if event.reset]
     names = [event.name for event in (resetting if len(resetting) > 1 else there)]
     return (f"{module.name}: the events {', '.join(names)} happen at one time, t = {times[0]:.9g} s, and what they do together "
-            "depends on their order, which changes with what sensitivities are by: there are no derivatives, and the numbers take "
-            "all of them for one event, at the time of the first one that resets; take another start, or one event with all resets")
+            "depends on their order, which changes with what derivatives are by: there are none, and the numbers take them for "
+            "one event, at the time of the first one that resets; take another start, or one event with all resets")
 
 
 def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:

@@ -15,6 +15,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.real_numbers import real_of
 from symdyn.runtime.constraints import holding
 from symdyn.runtime.integrating.at_kinks import staying
+from symdyn.runtime.integrating.grazing import grazing, jumping, without_rate
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request, accumulations
 from symdyn.runtime.integrating.without_effect import ROUNDING, unaffected
@@ -123,9 +124,9 @@ class Asked:
                                 "other parameters follow from one, as expressions of it, or leave out what is redundant")
 
     def doubts(self, module: Module, request: Request, outcome: Outcome, steps: Callable[[], Outcome]) -> list[str]:
-        """What to warn of: columns in which everything is zero all along, jumps that no event looks for, kinks that the motion
-        stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump or not depend on
-        a parameter."""
+        """What to warn of: columns in which everything is zero all along, jumps that no event looks for, events that graze, kinks
+        that the motion stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump,
+        or not depend on a parameter."""
         if not self.names or len(outcome.x) < 2:
             return []
         n_x, known = module.metadata.sizes.x, cache(steps)
@@ -144,7 +145,8 @@ class Asked:
         if cancel:
             found.append(f"{but} {', '.join(cancel)}, which cancel{'s' if len(cancel) == 1 else ''} in its equations: the "
                          "sensitivities are zero, and the numbers what is left of rounding")
-        return [*found, *gathered(module, outcome), *jumps, *staying(module, request, outcome.t, outcome.x[:, :n_x])]
+        return [*found, *gathered(module, outcome), *jumps, *_grazing(module, request, outcome),
+                *staying(module, request, outcome.t, outcome.x[:, :n_x])]
 
     def _cancelling(self, module: Module, request: Request, outcome: Outcome, start: np.ndarray, steps: Callable[[], Outcome],
                     nothing: Sequence[str]) -> list[str]:
@@ -199,6 +201,21 @@ def gathered(module: Module, outcome: Outcome) -> list[str]:
             "s on, within the tolerances of the motion, is left out: derivatives after it lose digits, those by a restitution "
             "most of all; end the motion before it, or compare with differences"
             for name, begin, end in accumulations(outcome, [one.name for one in module.metadata.contacts])]
+
+
+def _grazing(module: Module, request: Request, outcome: Outcome) -> list[str]:
+    """What to warn of where an event with an effect grazes, the first one."""
+    n_x, records = module.metadata.sizes.x, module.metadata.events
+    happened = [one for one in outcome.happened if not records[one.event].stop]
+    if not happened:
+        return []
+    t, k = np.array([one.t for one in happened]), np.array([one.event for one in happened])
+    before, after = (np.array(rows)[:, :n_x] for rows in zip(*[(one.before, one.after) for one in happened], strict=True))
+    size = np.maximum(np.abs(outcome.x[:, :n_x]).max(axis=0), np.abs(before).max(axis=0))
+    matter = (before != after).any(axis=1) | jumping(module, request, t, before, after, size)
+    t, k, before = t[matter], k[matter], before[matter]
+    graze = grazing(module, request, t, before, k, size) if len(t) else np.zeros(0, dtype=bool)
+    return [without_rate(module, int(k[graze][0]), float(t[graze][0]))] if graze.any() else []
 
 
 def unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:
