@@ -817,7 +817,8 @@ class _Phases:
         held, self.begins.directions = self.begins.directions, {}
         if held:
             slip = self._numbers(t, x).slip
-            fired = [(k, "sticks") for k, direction in held.items() if slip[self.tangents[k]] @ direction < 0]
+            fired = [(k, "sticks") for k, mode in enumerate(self.modes)  # of others, too: nothing looked at their slips
+                     if mode == SLIDING and self.directions[k].any() and slip[self.tangents[k]] @ self.directions[k] < 0]
             return (x, fired) if fired else (self._aligned(t, x, held), [])
         if self.begins.since:
             at = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], self._parameters()))
