@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, UnsupportedExpression
+from symdyn.real_numbers import real
 from symdyn.runtime.contradicted import contradiction, message
 from symdyn.runtime.raised import called
 from symdyn.shown import shown
@@ -107,8 +108,8 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
         returned = called(given, t, x, f"{module.name}: the function for {what} of the loss", (t, x.copy(), p.copy()))
         try:
             value, by_x, *rest = returned
-            by_p = np.asarray(rest[0] if rest else np.zeros(n_p), dtype=float)
-            result = float(value), np.asarray(by_x, dtype=float), np.append(by_p, 0.0)
+            by_p = real(rest[0] if rest else np.zeros(n_p))
+            result = float(value), real(by_x), np.append(by_p, 0.0)
             if result[1].shape != (n_x,) or by_p.shape != (n_p,) or len(rest) > 1:
                 raise ValueError
         except (TypeError, ValueError):

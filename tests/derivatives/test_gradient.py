@@ -147,6 +147,7 @@ END = sd.Loss(end=Q1)
     (sd.Loss(end="q1**2"), {}, r"the end of the loss is 'q1\*\*2'; pass an expression of coordinates"),
     (sd.Loss(integral=sp.Symbol("q9")), {}, "the integral of the loss has q9, which is no state, input or parameter here; there"),
     (sd.Loss(integral=sp.zeta(Q1)), {}, "the integral of the loss: .*; write it in coordinates and speeds, or pass a function"),
+    (sd.Loss(end=lambda t, x, p: (1.0, np.array([1 + 1j, 0, 0, 0]))), {}, r"needed are its value, its derivatives by the 4"),
     (sd.Loss(end=lambda t, x, p: 3.0), {}, r"returned 3.0 at t = 0.1; needed are its value, its derivatives by the 4 states"),
     (END, {"by": []}, "a gradient by nothing was asked for; name parameters"),
     (END, {"by": ["l7"]}, "neither a parameter, an input nor the initial value"),
@@ -166,6 +167,8 @@ def test_what_has_no_gradient() -> None:
         module().gradient(sd.Loss(end=lambda t, x, p: (0.0, np.array([np.inf, 0, 0, 0]))), **asked)
     with pytest.raises(EvaluationError, match=r"the function for the end of the loss raised ZeroDivisionError: .*, in line"):
         module().gradient(sd.Loss(end=lambda t, x, p: 1 / 0), **asked)
+    with pytest.raises(ArgumentError, match=r"a gradient was asked for on the backend numpy; the way back is compiled"):
+        sd.systems.pendulum().compile(backend="numpy").gradient(sd.Loss(end=Q1), ["l"], (0, 1))
     with pytest.raises(ArgumentError, match="the gradient has no 'm2'; it is by l1"):
         module().gradient(END, **asked)["m2"]
 

@@ -189,6 +189,9 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
                             f"{' and '.join(METHODS)}")
     if not asked.names:
         raise ArgumentError(f"{module.name}: a gradient by nothing was asked for; name parameters, inputs or initial values")
+    if module.backend != "c":
+        raise ArgumentError(f"{module.name}: a gradient was asked for on the backend {module.backend}; the way back is compiled: "
+                            "compile(backend='c')")
     check_compiled(module, request, method)
     return method
 
