@@ -268,9 +268,8 @@ class Discretized:
             m = of.expressions.m
             block = self._pointwise(of.expressions, columns, np.ones(1), sp.identity(m, format="csr"), np.zeros(m))
             found.append(_Part(m, None, block, of.least, of.most, [Label("", 0, np.array([np.nan]), of.texts, True)]))
-        if end.slopes.any():
-            block = self._pointwise(end, columns, np.ones(1), sp.csr_matrix((0, 1)), np.ones(1))
-            found.append(_Part(0, None, block, np.zeros(0), np.zeros(0), []))
+        block = self._pointwise(end, columns, np.ones(1), sp.csr_matrix((0, 1)), np.ones(1))
+        found.append(_Part(0, None, block, np.zeros(0), np.zeros(0), []))
         return found
 
     def _end(self) -> _Part:

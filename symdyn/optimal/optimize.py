@@ -97,9 +97,9 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     Derivatives that functions of the cost give are compared with differences of their values, at the guess and at the result.
     The result is simulated back. An OptimumWarning reports errors above the tolerance on the last mesh, and a motion simulated
     back that differs by more than the root of the tolerance, 0.01 without one, relative to the largest value of a state plus 1;
-    so does a cost integrated along the motion. Raises ArgumentError with all faults, NoOptimum with what is violated and by how
-    much, whose `optimum` is what was computed; EvaluationError for a cost that is not finite; MissingExtra where IPOPT is not
-    installed.
+    so does a cost integrated along the motion. Another one names costs and conditions that jump. Raises ArgumentError with all
+    faults, NoOptimum with what is violated and by how much, whose `optimum` is what was computed; EvaluationError for a cost that
+    is not finite; MissingExtra where IPOPT is not installed.
 
     >>> x = sd.coordinates("x")
     >>> F = sd.inputs("F")
@@ -130,6 +130,10 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     faults.demand_none()
     if method == "ipopt":
         ipopt.casadi()
+    if problem.jumps:
+        warnings.warn(f"{module.name}: {'; '.join(problem.jumps)}. Solvers that go by derivatives do not see jumps, and end at a "
+                      "motion beside which others may cost less: make them smooth, or optimize once for each side, with the side "
+                      "as a condition of path, and compare the costs", OptimumWarning, stacklevel=2)
     on_states = bool(_on_states(problem))
     chosen = replace(chosen, kind=chosen.kind or ("radau" if on_states else "hermite-simpson"),
                      degree=chosen.degree or (4 if on_states else 3))

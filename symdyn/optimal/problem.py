@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
 from symdyn.optimal.functions import WithFunctions
+from symdyn.optimal.jumping import jumping
 from symdyn.optimal.outputs import WithOutputs
 from symdyn.real_numbers import NotReal, number
 from symdyn.runtime.losses import Loss, output_names
@@ -52,6 +53,7 @@ class Problem:
     end_cost, boundary   by [x at the start; x; inputs; free parameters; t], at the end
     timed      which of the rates "rhs", "outputs" and constraints "C" depend on t where the duration is free
     kinks      parts of the cost that have kinks or jumps, as texts
+    jumps      what to say of costs and conditions that jump
     """
 
     module: Module
@@ -71,6 +73,7 @@ class Problem:
     boundary: Conditions
     timed: frozenset[str]
     kinks: tuple[str, ...]
+    jumps: tuple[str, ...]
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -141,8 +144,8 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     both = (*[f"{n}(0)" for n in metadata.x], *point)
     constants = {n: float(v) for n, v in zip(metadata.parameters, p, strict=True) if n not in names}
     timed = _timed(module, p) if T[0] < T[1] else frozenset[str]()
-    along_it = _Read(module, of, p, point, 0, constants, "outputs" in timed, faults)
-    at_both = _Read(module, of, p, both, of.n_x, constants, "outputs" in timed, faults)
+    along_it = _Read(module, of, p, point, 0, constants, "outputs" in timed, faults, ("t",) if T[0] == T[1] else (), [])
+    at_both = replace(along_it, names=both, first=of.n_x, jumps=[])
     losses = list(cost) if isinstance(cost, (list, tuple)) else [cost]
     if not losses or not all(isinstance(one, Loss) for one in losses):
         faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...), or several, which are added up")
@@ -161,7 +164,8 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
     params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
     return Problem(module, of, p, t0, T, begin, stop, states, of_inputs, of_rates, params_bounds, integrand, end_cost, along,
-                   at_ends, timed, _kinks([e for one in losses for e in (one.integral, one.end)]))
+                   at_ends, timed, _kinks([e for one in losses for e in (one.integral, one.end)]),
+                   (*along_it.jumps, *at_both.jumps))
 
 
 def _kinks(expressions: Sequence[Any]) -> tuple[str, ...]:
@@ -265,7 +269,8 @@ def _ends(metadata: Any, start: Any, end: Any, states: np.ndarray, faults: Fault
 
 @dataclass(frozen=True)
 class _Read:
-    """Takes expressions over: names of their arguments, in which [x; inputs; free parameters; t] begin at `first`."""
+    """Takes expressions over: names of their arguments, in which [x; inputs; free parameters; t] begin at `first`; fixed: those
+    that are given; jumps: collects what to say of expressions that jump."""
 
     module: Module
     of: Arguments
@@ -275,6 +280,8 @@ class _Read:
     constants: Mapping[str, float]
     timed: bool
     faults: Faults
+    fixed: tuple[str, ...]
+    jumps: list[str]
 
     def one(self, given: Any, what: str) -> sp.Expr:
         """An expression; 0, and a fault, for what is none."""
@@ -299,20 +306,25 @@ class _Read:
         """Costs, added up; None, and a fault, for what has no derivatives."""
         functions = [one for one in given if callable(one) and not hasattr(one, "free_symbols")]
         total = sum((self.one(one, what) for one in given if one not in functions), sp.S.Zero)
-        made = self.rows([total], what)
+        made = self.rows([total], what, [what])
         if made is None or not functions:
             return made
         return WithFunctions(made, functions, what, self.module, self.of, self.p, self.first)
 
-    def rows(self, given: Sequence[sp.Expr], what: str) -> Expressions | WithOutputs | None:
-        """Expressions as a function; None, and a fault, for what has no derivatives."""
+    def rows(self, given: Sequence[sp.Expr], what: str, each: Sequence[str]) -> Expressions | WithOutputs | None:
+        """Expressions as a function; None, and a fault, for what has no derivatives. what, each: as messages call them."""
         outputs = output_names(self.module)
         used = not set(outputs).isdisjoint(str(s) for e in given for s in e.free_symbols)
+        names = (*self.names, *outputs) if used else self.names
         try:
-            made = Expressions(given, (*self.names, *outputs) if used else self.names, self.constants)
+            made = Expressions(given, names, self.constants)
         except UnsupportedExpression as error:
             self.faults.add(f"{what}: {error}")
             return None
+        for expression, text in zip(given, each, strict=True):
+            found = jumping(expression, names, self.constants, self.fixed)
+            self.jumps.extend(f"{text} jumps by {jump['what']} where {jump['surface']} passes zero (write {jump['remedy']})"
+                              for jump in found)
         return WithOutputs(made, self.module, self.of, self.p, self.first, self.timed) if used else made
 
 
@@ -331,7 +343,7 @@ def _conditions(given: Any, what: str, read: _Read) -> Conditions | None:
         least.append(-np.inf if isinstance(relation, (sp.Le, sp.Lt)) else 0.0)
         most.append(np.inf if isinstance(relation, (sp.Ge, sp.Gt)) else 0.0)
         texts.append(text if len(text) <= LONGEST else f"{text[:LONGEST]} ... ({len(texts) + 1})")
-    made = read.rows(expressions, what)
+    made = read.rows(expressions, what, [f"the condition {text} of {what}" for text in texts])
     return None if made is None else Conditions(made, np.array(least), np.array(most), tuple(texts))
 
 

@@ -13,6 +13,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.optimal import ipopt
+from symdyn.optimal.problem import problem_of
 from symdyn.runtime.module import Module
 
 x, v, F = sp.symbols("x x_dot F")
@@ -268,6 +269,32 @@ def test_costs_with_kinks() -> None:
     with pytest.raises(sd.NoOptimum) as error:
         sd.optimize(system.compile(backend="c"), EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)})
     assert "kinks" not in str(error.value)
+
+
+def test_costs_and_conditions_that_jump(slider: Module) -> None:
+    """The place from 1/2 on costs 100 more: the solver ends at 62, and staying below 1/2 for longer costs 57 or less."""
+    jump: sp.Expr = sp.Heaviside(x - sp.Rational(1, 2))
+    given: dict[str, Any] = {"end": REST, "intervals": 4, "tolerance": None}
+    text = (r"the integral of the cost jumps by the condition x - 1/2 > 0 where x - 1/2 passes zero "
+            r"\(write \(1 \+ tanh\(\(x - 1/2\)/eps\)\)/2 .*Solvers that go by derivatives do not see jumps, .* "
+            r"with the side as a condition of path, and compare the costs")
+    with pytest.warns(sd.OptimumWarning, match=text):
+        found = sd.optimize(slider, sd.Loss(integral=F**2 + 100 * jump), 1.0, **given)
+    assert found.cost > 57
+    stepped = sp.Piecewise((1, v > 3), (2, True))
+    late: sp.Expr = sp.Heaviside(sd.t - 2)
+    for options, text in (
+            ({"path": [F * sp.sign(v) <= 30]}, r"the condition F\*sign\(x_dot\) <= 30 of path jumps by sign\(x_dot\)"),
+            ({"boundary": [sp.floor(x) + sp.Symbol("x(0)") <= 3]}, r"the condition .* of boundary jumps by floor\(x\)"),
+            ({"cost": sd.Loss(end=stepped)}, "the end of the cost jumps by the condition"),
+            ({"duration": (0.9, 1.1), "path": [x <= 2 + late]}, "of path jumps by the condition t")):
+        with pytest.warns(sd.OptimumWarning, match=text):
+            sd.optimize(slider, **{"cost": EFFORT, "duration": 1.0, **given, **options})
+    smooth = [x * sp.sign(x), (x - 2) * sp.Heaviside(x - 2), sp.Piecewise((v**2 / 2, sp.Abs(v) < 1), (sp.Abs(v) - 0.5, True)),
+              sp.Heaviside(sd.t - sp.Rational(1, 2)), sp.Max(x, v), sp.Abs(F), sp.sin(5 * x) / sp.sqrt(1 + v**2)]
+    problem = problem_of(slider, sd.Loss(integral=sum(smooth)), 1.0, None, None, None, None, [e <= 3 for e in smooth], [],
+                         None, None, None, 0.0)
+    assert problem.jumps == ()
 
 
 @pytest.mark.parametrize("method", ["ipopt", "slsqp"])
