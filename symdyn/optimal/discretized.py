@@ -13,8 +13,9 @@ from symdyn.errors import ArgumentError
 from symdyn.optimal.field import Dynamics, Field, Rows
 from symdyn.optimal.loops import Loops, UnitLengths, independent_rows, normals, unit_groups
 from symdyn.optimal.problem import Problem
-from symdyn.optimal.program import Block, Label, Program
+from symdyn.optimal.program import Block, Label, Program, Scaled, unit
 from symdyn.optimal.quadrature import integrals
+from symdyn.optimal.sizes import Sizes, found_sizes, given_sizes
 from symdyn.optimal.steps import Steps
 from symdyn.optimal.transcription import Transcription, gauss_points
 
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 MOTION = "the equation of motion of "
-# What a condition whose variables are all given may lack.
+# What a condition whose variables are all given may lack, of its size.
 GIVEN = 1e-7
+# How far from the guess, of the sizes of variables, the cost and conditions have their sizes, too: both may be flat at the guess.
+BESIDE = 0.1
 # Relative errors of integrals of the cost along polynomials, and along motions simulated back, whose states have errors.
 EXACT, SIMULATED = 1e-11, 1e-8
 
@@ -57,6 +60,8 @@ class Discretized:
 
     steps   in each interval of shooting
     elastic   whether what is demanded of the motion may be missed, the sum of what is missed being the cost
+    sizes   of states, inputs, parameters and duration; None: by what is given
+    scaled  the program in units of sizes, as solvers take it
     """
 
     problem: Problem
@@ -64,6 +69,7 @@ class Discretized:
     steps: int
     guess: Motion
     elastic: bool = False
+    sizes: Sizes | None = None
 
     def __post_init__(self) -> None:
         problem, mesh = self.problem, self.mesh
@@ -74,7 +80,11 @@ class Discretized:
         self.normals = normals(problem.module, t[1:], X[1:], self.guess.p, self.rows_of_loops)
         self.layout = self._laid_out()
         self.z = self.variables(self.guess)
+        if self.sizes is None:
+            self.sizes = given_sizes(problem, self.dynamics, *self._points(self.guess))
+        self.z_sizes = self._sizes_of_variables(self.sizes)
         self.program = self._program()
+        self.scaled = Scaled(self.program, self.z_sizes, self.g_sizes, self._size_of_cost())
 
     # -- variables
 
@@ -116,6 +126,64 @@ class Discretized:
             found.append(z)
         return found[0], found[1]
 
+    # -- sizes
+
+    def _sizes_of_variables(self, sizes: Sizes) -> np.ndarray:
+        at, found = self.layout, np.ones(self.layout.n)
+        found[at.X], found[at.U], found[at.params] = sizes.x, sizes.inputs, sizes.params
+        if at.corrections.size:
+            found[at.corrections] = 1 / np.linalg.norm(self.normals / sizes.x[:, None], axis=1)
+        if at.duration >= 0:
+            found[at.duration] = sizes.duration
+        return unit(found)
+
+    def _beside(self, z_least: np.ndarray, z_most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The guess, and variables beside it."""
+        n = self.layout.n
+        return self.z[:n], np.clip(self.z[:n] + BESIDE * self.z_sizes[:n], z_least[:n], z_most[:n])
+
+    def _sizes_of_rows(self, program: Program) -> np.ndarray:
+        """What variables of their sizes change each row by, (m,): by its linear part; without one by its derivatives, the largest
+        at all times; else what it is."""
+        linear = abs(program.L) @ sp.diags(self.z_sizes[:program.n])
+        found = np.asarray(linear.max(axis=1).todense()).ravel() if program.L.nnz else np.zeros(program.m)
+        curved = np.zeros(program.m)
+        for z in self._beside(program.z_least, program.z_most):
+            J = np.nan_to_num(np.abs(program.jacobian(z)), nan=0.0, posinf=0.0) * self.z_sizes[program.jacobian_columns]
+            np.maximum.at(curved, program.jacobian_rows, J)
+        there = np.nan_to_num(np.abs(program.g(self.z)), nan=0.0, posinf=0.0)
+        for label in program.labels:
+            rows = slice(label.first, label.first + label.n)
+            for of in (curved, there):
+                of[rows] = np.tile(of[rows].reshape(-1, len(label.entries)).max(axis=0, initial=0.0), len(label.shares))
+        for other in (curved, there, np.ones(program.m)):
+            found = np.where(found > 0, found, other)
+        return unit(found)
+
+    def _size_of_cost(self) -> float:
+        """What variables of their sizes change the cost by, at the guess or beside it."""
+        if self.elastic:
+            return 1.0
+        program = self.program
+        moving = program.z_least < program.z_most
+        slopes = [np.abs(program.gradient(z) * self.z_sizes)[moving].sum()
+                  for z in self._beside(program.z_least, program.z_most)]
+        size = max((slope for slope in slopes if np.isfinite(slope)), default=0.0)
+        return float(unit(np.array(size))) if size > 0 else 1.0
+
+    def found_sizes(self, z: np.ndarray) -> Sizes:
+        """Those of a solution."""
+        assert self.sizes is not None
+        return found_sizes(self.problem.of, self._points(self.motion(z))[1], self.sizes)
+
+    def _points(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Times (P,) and arguments of the rates (P, n) at the points of the field."""
+        mesh, P = self.mesh, len(self.mesh.shares)
+        free = motion.p[list(self.problem.of.free)]
+        at = np.hstack([motion.X[mesh.at_state], motion.U[mesh.at_inputs[:, 0]], np.broadcast_to(free, (P, len(free))),
+                        np.full((P, 1), motion.T)])
+        return self.problem.t0 + mesh.shares * motion.T, at
+
     # -- the program
 
     def _program(self) -> Program:
@@ -128,6 +196,7 @@ class Discretized:
         moving = least < most
         depends = np.zeros(program.m, dtype=bool)
         depends[program.jacobian_rows[moving[program.jacobian_columns]]] = True
+        self.g_sizes = self._sizes_of_rows(program)
         if not depends.all():
             program = self._without(program, depends)
         return self._with_slacks(program) if self.elastic else program
@@ -150,7 +219,7 @@ class Discretized:
     def _without(self, program: Program, depends: np.ndarray) -> Program:
         """Without rows that depend on nothing that is free. Raises ArgumentError where one of them does not hold."""
         missing = program.violations(self.z)
-        wrong = np.flatnonzero(~depends & ~(missing <= GIVEN))
+        wrong = np.flatnonzero(~depends & ~(missing <= GIVEN * self.g_sizes))
         if len(wrong) and not self.elastic:
             texts = [f"{self.text(program, row)} by {missing[row]:.3g}" for row in wrong[:4]]
             if len(wrong) > len(texts):
@@ -159,6 +228,7 @@ class Discretized:
             raise ArgumentError(f"{self.problem.module.name}: what is prescribed violates {'; '.join(texts)}; change the start, "
                                 f"the end or the condition{how}")
         kept = np.flatnonzero(depends)
+        self.g_sizes = self.g_sizes[kept]
         labels, first = [], 0
         for label in program.labels:
             for k, share in enumerate(label.shares):
@@ -171,16 +241,16 @@ class Discretized:
                        labels)
 
     def _with_slacks(self, program: Program) -> Program:
-        """With two more variables for each condition, by which it is missed, and their sum as the cost."""
+        """With two more variables for each condition, by which it is missed, and their sum, in units of sizes, as the cost."""
         rows = np.array([k for label in program.labels if label.soft for k in range(label.first, label.first + label.n)],
                         dtype=int)
         n, s = program.n, len(rows)
         more = sp.csr_matrix((np.repeat([1.0, -1.0], s), (np.tile(rows, 2), np.arange(2 * s))), (program.m, 2 * s))
         of_slacks = Block(_Sum(), np.arange(n, n + 2 * s)[:, None], np.zeros((2 * s, 1)), np.ones((2 * s, 1)),
-                          sp.csr_matrix((program.m, 2 * s)), np.ones(2 * s))
+                          sp.csr_matrix((program.m, 2 * s)), 1 / np.tile(self.g_sizes[rows], 2))
         missing = np.nan_to_num(program.violations(self.z)[rows])
         self.z = np.concatenate([self.z, missing, missing])
-        self.slacks = rows
+        self.slacks, self.z_sizes = rows, np.concatenate([self.z_sizes, np.tile(self.g_sizes[rows], 2)])
         least, most = np.append(program.z_least, np.zeros(2 * s)), np.append(program.z_most, np.full(2 * s, np.inf))
         return Program([*program.blocks, of_slacks], sp.hstack([program.L, more]).tocsr(), least, most, program.g_least,
                        program.g_most, program.labels)
@@ -189,6 +259,10 @@ class Discretized:
         """What a row of the constraints is, and when, by the duration of the guess."""
         text, share = program.what(row)
         return text if np.isnan(share) else f"{text} at t = {self.problem.t0 + share * self.guess.T:.4g} s"
+
+    def violations(self, z: np.ndarray) -> np.ndarray:
+        """By how much each row of the constraints is beyond its bounds, in units of its size."""
+        return self.scaled.violations(z / self.z_sizes)
 
     def field(self, shares: np.ndarray) -> Field:
         """The rates at points."""
@@ -352,18 +426,17 @@ class Discretized:
     def errors(self, z: np.ndarray) -> np.ndarray:
         """The error of each interval (K,): what the rates of the polynomials lack of those of the equations, integrated over it;
         of shooting, how far steps of half the length lead elsewhere; with the corrections that keep the constraints. Relative to
-        the largest state or rate, plus 1.
+        the sizes of the states along the motion.
 
         Source: Betts, section 4.7.
         """
-        mesh, n_x, motion = self.mesh, self.problem.of.n_x, self.motion(z)
+        mesh, n_x, motion, size = self.mesh, self.problem.of.n_x, self.motion(z), self.found_sizes(z).x
         corrections = np.abs(np.einsum("kxi,ki->kx", self.normals, z[self.layout.corrections]))
         if mesh.kind == "radau":
             corrections *= (mesh.b / mesh.W.diagonal())[-1]
         if mesh.kind == "shooting":
             at = self._arguments(motion)
             once, twice = self.flow().values(at), self.flow(2 * self.steps).values(at)
-            size = np.abs(motion.X).max(axis=0) + 1
             return np.asarray(((np.abs(twice - once)[:, :n_x] * 16 / 15 + corrections) / size).max(axis=1))
         shares, weights = gauss_points(mesh.breaks)
         x, u = self.polynomials(motion)
@@ -371,12 +444,12 @@ class Discretized:
         at = np.hstack([x(flat), u(flat), np.broadcast_to(free, (len(flat), len(free))), np.full((len(flat), 1), motion.T)])
         F = self.field(flat).values(at)[:, :n_x]
         lacking = np.abs(x.derivative()(flat) - F).reshape(*shares.shape, n_x)
-        size = np.maximum(np.abs(motion.X).max(axis=0), np.abs(F).max(axis=0) / motion.T) + 1
         return np.asarray(((np.einsum("kg,kgi->ki", weights, lacking) + corrections) / size).max(axis=1))
 
     def cost_along(self, z: np.ndarray, accuracy: float) -> tuple[float, np.ndarray]:
         """The cost integrated along the polynomials, and by how much the quadrature of each interval differs from that, (K,),
-        relative to the cost: the integral of its absolute value, and the end. What is below the accuracy counts nothing."""
+        relative to the cost: the integral of its absolute value, and the end. What is below the accuracy, of the size by which
+        the cost changes, counts nothing."""
         mesh, motion = self.mesh, self.motion(z)
         x, u = self.polynomials(motion)
         rate = lambda shares: motion.T * self._integrand(motion, shares, x(shares), u(shares))
@@ -385,7 +458,7 @@ class Discretized:
         size = float(sizes.sum()) + abs(end)
         quadrature = mesh.B @ self.flow().values(self._arguments(motion))[:, -1]
         with np.errstate(invalid="ignore"):  # of costs that are infinite
-            missing = np.maximum(np.abs(quadrature - by_interval) - accuracy, 0.0)
+            missing = np.maximum(np.abs(quadrature - by_interval) - accuracy * self.scaled.cost_size, 0.0)
         return float(by_interval.sum()) + end, np.divide(missing, size, out=missing, where=missing > 0)
 
     def cost_of(self, z: np.ndarray, simulated: Solution) -> float:

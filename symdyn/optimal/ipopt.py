@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, MissingExtra
-from symdyn.optimal.program import Program
+from symdyn.optimal.program import Scaled
 
 # What IPOPT returns at a solution.
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -45,7 +45,7 @@ def casadi() -> Any:
     return ca
 
 
-def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int, options: Mapping[str, Any],
+def solve(program: Scaled, z: np.ndarray, accuracy: float, max_iterations: int, options: Mapping[str, Any],
           verbose: bool = False) -> Found:
     """A local minimum near z. Raises MissingExtra where CasADi is not installed, and what the functions of the program raise."""
     ca = casadi()
@@ -73,7 +73,7 @@ def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int,
                  stats["return_status"].replace("_", " "))
 
 
-def _callbacks(ca: Any, program: Program) -> dict[str, Any]:
+def _callbacks(ca: Any, program: Scaled) -> dict[str, Any]:
     """Functions as CasADi calls them: of x, p and, of the Hessian, the multipliers of f and g; "raised": what they raised."""
     n, m = program.n, program.m
     dense = ca.Sparsity.dense

@@ -20,6 +20,7 @@ from symdyn.optimal.ipopt import Found
 from symdyn.optimal.loops import on_constraints, unit_groups
 from symdyn.optimal.problem import Faults, Problem, problem_of
 from symdyn.optimal.result import MeshRecord, Optimum
+from symdyn.optimal.sizes import Sizes
 from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
 from symdyn.real_numbers import NotReal, real
 from symdyn.runtime.module import demand_module
@@ -47,14 +48,16 @@ METHODS = ("ipopt", *scipy_solvers.METHODS)
 PARTS, MOST_INTERVALS, MOST_STEPS = 4, 2000, 512
 # Degrees of Radau's method: the inputs between its points are at most cubic, as tables have them.
 DEGREES = (1, 2, 3, 4)
-# What the elastic problem must miss for the problem to be infeasible.
+# What the elastic problem must miss for the problem to be infeasible, of the sizes of conditions.
 MISSED = 1e-6
 # What a motion simulated back may differ by without a warning, relative: without a tolerance; with one, its root.
 APART = 0.01
 # What cost and conditions may change by where nothing depends on a value.
 UNCHANGED = 1e-12
-# A cost that is as far below that of the guess, in units of it plus 1, has fallen without bound.
+# A cost that is as far below that of the guess, in units of it and of its size, has fallen without bound.
 FALLEN = 1e8
+# A motion that is so many times as large as it was taken for is found once more, with sizes by itself.
+GROWN = 100.0
 # Of normals at the guess and at the solution: where the smallest singular value of their products is less, they are taken again.
 TRANSVERSAL = 0.5
 
@@ -96,10 +99,10 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
     Constraints of closed loops are kept at the ends of all intervals, for positions and velocities. All derivatives are exact.
     Derivatives that functions of the cost give are compared with differences of their values, at the guess and at the result.
     The result is simulated back. An OptimumWarning reports errors above the tolerance on the last mesh, and a motion simulated
-    back that differs by more than the root of the tolerance, 0.01 without one, relative to the largest value of a state plus 1;
-    so does a cost integrated along the motion. Another one names costs and conditions that jump. Raises ArgumentError with all
-    faults, NoOptimum with what is violated and by how much, whose `optimum` is what was computed; EvaluationError for a cost that
-    is not finite; MissingExtra where IPOPT is not installed.
+    back that differs by more than the root of the tolerance, 0.01 without one, relative to the size of a state, `sizes` of the
+    result; so does a cost integrated along the motion. Another one names costs and conditions that jump. Raises ArgumentError
+    with all faults, NoOptimum with what is violated and by how much, whose `optimum` is what was computed; EvaluationError for a
+    cost that is not finite; MissingExtra where IPOPT is not installed.
 
     >>> x = sd.coordinates("x")
     >>> F = sd.inputs("F")
@@ -354,9 +357,11 @@ class _Search:
         """See optimize."""
         chosen, problem = self.chosen, self.problem
         breaks, steps, course = chosen.breaks, chosen.steps, self.course
-        tolerance, solved = chosen.tolerance, None
+        tolerance = chosen.tolerance
+        solved: _Solved | None = None
+        sizes: Sizes | None = None
         while True:
-            before, solved = solved, self._measured(*self._solved(breaks, steps, course), solved)
+            before, solved = solved, self._measured(*self._solved(breaks, steps, course, sizes), solved)
             self._demand_derivatives(solved.made, solved.found.z)
             if not solved.found.solved:
                 raise self._failed(solved, before)
@@ -370,7 +375,7 @@ class _Search:
             breaks, steps = finer
             motion = solved.made.motion(solved.found.z)
             x, u = solved.made.polynomials(motion)
-            course = _Course(x, u, motion.p, motion.T)
+            course, sizes = _Course(x, u, motion.p, motion.T), solved.made.found_sizes(solved.found.z)
         if too_large:
             of = "" if solved.of_states.max() >= solved.of_cost.max() else ", of the integral of the cost,"
             warnings.warn(f"{problem.module.name}: the error of an interval{of} is {solved.errors.max():.2g} after "
@@ -390,12 +395,12 @@ class _Search:
                           f"{'it keeps its' if few else 'they keep their'} guess and {'is' if few else 'are'} undetermined; "
                           f"{'prescribe it' if few else 'prescribe them'}, or let the cost depend on "
                           f"{'it' if few else 'them'}", OptimumWarning, stacklevel=3)
-        apart = self._apart(optimum)
+        apart = self._apart(optimum, solved)
         if apart:
             warnings.warn(f"{problem.module.name}: {apart}; {self._finer(optimum)}", OptimumWarning, stacklevel=3)
         return optimum
 
-    def _apart(self, optimum: Optimum) -> str:
+    def _apart(self, optimum: Optimum, solved: _Solved) -> str:
         """In what the motion simulated back, and the cost along it, differ by too much; nothing if they do not."""
         tolerance = self.chosen.tolerance
         most = APART if tolerance is None else np.sqrt(tolerance)
@@ -403,16 +408,16 @@ class _Search:
             why = "" if optimum.simulated is None else f": {optimum.simulated.message}"
             return f"the motion could not be simulated back by its inputs{why}"
         gaps, found = np.array(list(optimum.difference.values())), []
-        parts = gaps / (1 + np.abs(optimum.x).max(axis=0))
+        parts = gaps / np.array(list(optimum.sizes.values()))
         if len(parts) and not parts.max() <= most:
             k = int(parts.argmax())
             found.append(f"simulated back by its inputs, {optimum.module.metadata.x[k]} differs by {gaps[k]:.3g} from the motion "
                          "found")
-        away = abs(optimum.cost_difference)
-        if not away <= max(most * max(abs(optimum.cost), abs(optimum.integrated_cost)), 2 * self.chosen.accuracy):
+        away, least = abs(optimum.cost_difference), 2 * self.chosen.accuracy * solved.made.scaled.cost_size
+        if not away <= max(most * max(abs(optimum.cost), abs(optimum.integrated_cost)), least):
             found.append(f"the cost is {optimum.cost:.6g} by the quadrature of the mesh, and {optimum.integrated_cost:.6g} "
                          "integrated along the motion")
-        return "; ".join(found) + (f" (allowed is {most:.2g} of the largest value plus 1, or of the cost)" if found else "")
+        return "; ".join(found) + (f" (allowed is {most:.2g} of the size of a state, or of the cost)" if found else "")
 
     def _finer(self, optimum: Optimum) -> str:
         """What to do about a motion that is not exact enough."""
@@ -441,28 +446,35 @@ class _Search:
         lap, self._last = now - getattr(self, "_last", self.begun), now
         return lap
 
-    def _solved(self, breaks: np.ndarray, steps: int, course: _Course) -> tuple[Discretized, Found]:
-        """The solution on a mesh; once more where the normals of constraints have turned too far from those of the guess."""
+    def _solved(self, breaks: np.ndarray, steps: int, course: _Course, sizes: Sizes | None) -> tuple[Discretized, Found]:
+        """The solution on a mesh; once more where the normals of constraints have turned too far from those of the guess, or
+        something is much larger than it was taken for. sizes: of the mesh before; None: by what is given."""
         mesh = self.chosen.mesh(breaks)
         guess = course.on(mesh)
         if course.leading is not None and self.problem.module.metadata.constraints:
             t = self.problem.t0 + mesh.nodes * course.T
             guess = replace(guess, X=on_constraints(self.problem.module, t, guess.X, guess.p, course.leading))
         for group in unit_groups(self.problem.module):
-            sizes = np.linalg.norm(guess.X[:, group], axis=1)
-            if not (sizes > 0).all():
+            lengths = np.linalg.norm(guess.X[:, group], axis=1)
+            if not (lengths > 0).all():
                 names = [self.problem.module.metadata.q[k] for k in group]
                 raise ArgumentError(f"{self.problem.module.name}: {', '.join(names)} have unit length together, and are zero in "
                                     "the guess; pass a guess of them, or the other sign at the end, the same orientation")
-            guess.X[:, group] /= sizes[:, None]
+            guess.X[:, group] /= lengths[:, None]
         for _ in range(4):
-            made = Discretized(self.problem, mesh, steps, guess)
+            made = Discretized(self.problem, mesh, steps, guess, sizes=sizes)
             self._demand_finite(made)
             self._demand_derivatives(made, made.z)
             found = self._kept(made, self._solve(made))
-            if not found.solved or not made.normals.size or made.transversal(made.motion(found.z)) > TRANSVERSAL:
+            if not np.isfinite(found.z).all():
                 break
-            guess = made.motion(found.z)
+            assert made.sizes is not None
+            now = made.found_sizes(found.z)
+            turned = found.solved and bool(made.normals.size) and (
+                made.transversal(made.motion(found.z)) <= TRANSVERSAL)
+            if not turned and not (found.solved and now.grown(made.sizes, GROWN)):
+                break
+            guess, sizes = made.motion(found.z), now
         return made, found
 
     def _kept(self, made: Discretized, found: Found) -> Found:
@@ -470,11 +482,11 @@ class _Search:
         self.undetermined: tuple[str, ...] = ()
         if not found.solved or not np.isfinite(found.z).all():
             return found
-        names, z, least = made.undetermined(found.z), found.z.copy(), made.program.violations(found.z)
+        names, z, least = made.undetermined(found.z), found.z.copy(), made.violations(found.z)
         for where in names.values():
             z[where] = made.z[where]
-        same = abs(made.program.f(z) - found.cost) <= UNCHANGED * (1 + abs(found.cost))
-        if not names or not same or not (made.program.violations(z) <= least + UNCHANGED).all():
+        same = abs(made.program.f(z) - found.cost) <= UNCHANGED * (made.scaled.cost_size + abs(found.cost))
+        if not names or not same or not (made.violations(z) <= least + UNCHANGED).all():
             return found
         self.undetermined = tuple(names)
         return replace(found, z=z)
@@ -496,9 +508,14 @@ class _Search:
 
     def _solve(self, made: Discretized) -> Found:
         chosen = self.chosen
+        scaled, begin = made.scaled, made.z / made.scaled.z_sizes
         if chosen.method == "ipopt":
-            return ipopt.solve(made.program, made.z, chosen.accuracy, chosen.max_iterations, chosen.options, chosen.verbose)
-        return scipy_solvers.solve(made.program, made.z, chosen.accuracy, chosen.max_iterations, chosen.method)
+            found = ipopt.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.options, chosen.verbose)
+        else:
+            found = scipy_solvers.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.method)
+        return replace(found, z=found.z * scaled.z_sizes, cost=found.cost * scaled.cost_size,
+                       multipliers=found.multipliers * scaled.cost_size / scaled.g_sizes,
+                       of_bounds=found.of_bounds * scaled.cost_size / scaled.z_sizes)
 
     def _demand_finite(self, made: Discretized) -> None:
         """Raises EvaluationError where cost or constraints are not finite at the guess."""
@@ -541,13 +558,14 @@ class _Search:
         x, u = in_time(x), in_time(u)
         t = problem.t0 + mesh.nodes * motion.T
         metadata = problem.module.metadata
+        sizes = dict(zip(metadata.x, made.found_sizes(found.z).x.tolist(), strict=True))
         optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
                           {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)},
                           self.undetermined, found.cost, solved.along, np.nan, motion.T,
                           sum(r.iterations for r in solved.records), solved.records, float(solved.errors.max()), solved.errors,
                           dict.fromkeys(metadata.x, np.nan), None,
                           made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
-                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, x, u)
+                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, sizes, x, u)
         simulated, difference, cost = None, optimum.difference, np.nan
         if np.isfinite(optimum.x).all():
             with contextlib.suppress(SymdynError), warnings.catch_warnings():
@@ -582,7 +600,7 @@ class _Search:
         head += self._kinked()
         try:
             begin = made.motion(found.z) if np.isfinite(found.z).all() else made.guess
-            elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True)
+            elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True, sizes=made.sizes)
             nearest = self._solve(elastic)
         except (SymdynError, RuntimeError):
             return NoOptimum(f"{head}; {self._worst(made, found.z)}", optimum)
@@ -590,18 +608,19 @@ class _Search:
         missed = np.abs(s[0] - s[1])
         if not nearest.solved:
             return NoOptimum(f"{head}; {self._worst(made, found.z)}; begin with another guess{self._radau_instead()}", optimum)
-        if missed.max(initial=0.0) <= MISSED:
+        parts = missed / elastic.g_sizes[elastic.slacks]
+        if parts.max(initial=0.0) <= MISSED:
             return NoOptimum(f"{head}; a motion that fulfils all conditions exists, so begin with another guess: "
                              f"{self._worst(made, found.z)}{self._radau_instead()}", optimum)
         texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
-                for k in np.argsort(-missed)[:4] if missed[k] > MISSED]
+                for k in np.argsort(-parts)[:4] if parts[k] > MISSED]
         return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",
                          optimum)
 
     def _fallen(self, made: Discretized, found: Found) -> str:
         """What to say of a cost that goes to minus infinity; nothing where it does not."""
         begin = made.program.f(made.z)
-        if found.cost > begin - FALLEN * (1 + abs(begin)) or np.isnan(found.cost):
+        if found.cost > begin - FALLEN * (made.scaled.cost_size + abs(begin)) or np.isnan(found.cost):
             return ""
         problem, motion = self.problem, made.motion(found.z)
         inputs, states = problem.module.metadata.inputs, problem.module.metadata.x
@@ -627,10 +646,10 @@ class _Search:
 
     def _worst(self, made: Discretized, z: np.ndarray) -> str:
         """The largest violation where the solver ended."""
-        missing = made.program.violations(z)
+        missing = made.violations(z)
         if np.isnan(missing).any():
             return "the last point cannot be evaluated"
         row = int(missing.argmax()) if len(missing) else 0
         if not len(missing) or missing[row] <= self.chosen.accuracy:
             return "all conditions are fulfilled there, and the cost is not at its minimum"
-        return f"the largest violation left is {missing[row]:.3g}, of {made.text(made.program, row)}"
+        return f"the largest violation left is {missing[row] * made.scaled.g_sizes[row]:.3g}, of {made.text(made.program, row)}"

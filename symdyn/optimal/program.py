@@ -16,6 +16,9 @@ import scipy.sparse as sp
 
 from symdyn.optimal.field import Rows
 
+# Units are powers of two to this power.
+PREFIX = 10.0
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -193,6 +196,53 @@ class Program:
                 k, entry = divmod(row - label.first, len(label.entries))
                 return f"{label.text}{label.entries[entry]}", float(label.shares[k])
         raise IndexError(row)
+
+
+def unit(sizes: np.ndarray) -> np.ndarray:
+    """The next powers of 1024: units, like milli and kilo, in which sizes are near 1, and by which numbers are scaled without
+    rounding. What is of the size 1/32 to 32 stays as it is."""
+    return np.asarray(np.exp2(PREFIX * np.round(np.log2(sizes) / PREFIX)))
+
+
+class Scaled:
+    """A program in units in which its variables, constraints and cost are of the size 1: what solvers are given.
+
+    z_sizes (n,), g_sizes (m,), cost_size   their units, see `unit`
+    """
+
+    def __init__(self, program: Program, z_sizes: np.ndarray, g_sizes: np.ndarray, cost_size: float) -> None:
+        self.program, self.z_sizes, self.g_sizes, self.cost_size = program, z_sizes, g_sizes, cost_size
+        self.n, self.m = program.n, program.m
+        self.z_least, self.z_most = program.z_least / z_sizes, program.z_most / z_sizes
+        self.g_least, self.g_most = program.g_least / g_sizes, program.g_most / g_sizes
+        self.jacobian_rows, self.jacobian_columns = program.jacobian_rows, program.jacobian_columns
+        self.hessian_rows, self.hessian_columns = program.hessian_rows, program.hessian_columns
+        self._of_jacobian = z_sizes[self.jacobian_columns] / g_sizes[self.jacobian_rows]
+        self._of_hessian = z_sizes[self.hessian_rows] * z_sizes[self.hessian_columns]
+
+    def f(self, y: np.ndarray) -> float:
+        """The cost."""
+        return self.program.f(y * self.z_sizes) / self.cost_size
+
+    def g(self, y: np.ndarray) -> np.ndarray:
+        """The constraints (m,)."""
+        return self.program.g(y * self.z_sizes) / self.g_sizes
+
+    def gradient(self, y: np.ndarray) -> np.ndarray:
+        """Of the cost (n,)."""
+        return self.program.gradient(y * self.z_sizes) * self.z_sizes / self.cost_size
+
+    def jacobian(self, y: np.ndarray) -> np.ndarray:
+        """Of the constraints, the entries of the pattern."""
+        return self.program.jacobian(y * self.z_sizes) * self._of_jacobian
+
+    def hessian(self, y: np.ndarray, cost: float, multipliers: np.ndarray) -> np.ndarray:
+        """Of cost f + multipliers^T g, the entries of the upper triangle's pattern."""
+        return self.program.hessian(y * self.z_sizes, cost / self.cost_size, multipliers / self.g_sizes) * self._of_hessian
+
+    def violations(self, y: np.ndarray) -> np.ndarray:
+        """By how much each row of g is beyond its bounds, (m,); NaN where it cannot be evaluated."""
+        return self.program.violations(y * self.z_sizes) / self.g_sizes
 
 
 def _expanded(rows: np.ndarray, indices: np.ndarray, data: np.ndarray, m: int, n: int, by: np.ndarray,

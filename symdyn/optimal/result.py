@@ -51,6 +51,7 @@ class Optimum(OverTime):
     error          largest error of an interval of the last mesh, of states and cost, relative: see docs/optimal_motion.md;
                    errors: of all (K,)
     simulated      the motion by `simulate` with these inputs; None where it cannot be computed
+    sizes          by state: its largest value, which errors are relative to
     difference     by state: largest difference of it, in units of the state; NaN where it cannot be computed
     multipliers    by condition: of the path (n,), of the boundary (1,); derivatives of the cost by what is demanded, with the
                    sign of f + multipliers^T g; NaN where the solver has none
@@ -93,6 +94,7 @@ class Optimum(OverTime):
     message: str
     seconds: float
     breaks: np.ndarray
+    sizes: Mapping[str, float]
     states_over_time: PPoly = field(repr=False)
     inputs_over_time: PPoly = field(repr=False)
 
@@ -117,12 +119,13 @@ class Optimum(OverTime):
         return as_table(self.inputs_over_time)
 
     def simulate(self, t: Row | None = None, rtol: float = 1e-9, method: str | None = None) -> Solution:
-        """The motion from the same start with these inputs, integrated with error control; t: output times, default: the
-        nodes."""
+        """The motion from the same start with these inputs, integrated with error control, rtol being relative to the sizes of
+        states, too; t: output times, default: the nodes."""
         sizes = self.module.metadata.sizes
         q, u, z = np.split(self.x[0], [sizes.q, sizes.q + sizes.u])
-        return self.module.simulate(self.t if t is None else t, q, u, self.params, z=z, rtol=rtol, method=method, events=False,
-                                    inputs=self.table if sizes.inputs else None)
+        atol = rtol * np.array(list(self.sizes.values()))
+        return self.module.simulate(self.t if t is None else t, q, u, self.params, z=z, rtol=rtol, atol=atol, method=method,
+                                    events=False, inputs=self.table if sizes.inputs else None)
 
     def lqr(self, Q: Weights, R: Weights, Qf: Weights | None = None) -> Tracking:
         """The time-varying linear-quadratic regulator about the motion: inputs of least integral of dx^T Q dx + din^T R din and

@@ -9,14 +9,14 @@ import scipy.sparse as sp
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from symdyn.optimal.ipopt import Found
-from symdyn.optimal.program import Program
+from symdyn.optimal.program import Scaled
 
 METHODS = ("slsqp", "trust-constr")
 # What constraints may lack at a solution of these methods, of the size of their bounds plus 1.
 FULFILLED = 1e-6
 
 
-def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int, method: str) -> Found:
+def solve(program: Scaled, z: np.ndarray, accuracy: float, max_iterations: int, method: str) -> Found:
     """A local minimum near z; see Found."""
     free = program.z_least < program.z_most
     whole = lambda y: _filled(z, free, y)

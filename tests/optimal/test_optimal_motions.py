@@ -129,6 +129,53 @@ def test_linear_quadratic_problem_against_riccati() -> None:
             assert np.abs(regulator.K(t) - B.T @ S(t)).max() < 1e-6
 
 
+@functools.cache
+def sprung() -> Module:
+    x, (m, k) = sd.coordinates("x"), sd.parameters("m k")
+    system = sd.System("sprung")
+    body = system.add_body("body", mass=m)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_joint_force(slide, sd.inputs("F") - k * x)
+    return system.compile(backend="c")
+
+
+@pytest.mark.parametrize(("options", "near"), [
+    ({"tolerance": 1e-7}, 1e-6), ({"transcription": "radau"}, 1e-6), ({"transcription": "shooting"}, 2e-4),
+    ({"method": "slsqp", "intervals": 8, "tolerance": None}, 1e-3)])
+def test_small_and_large_motions(options: dict[str, Any], near: float) -> None:
+    """A mass on a spring comes to rest at a: the effort is a^2 b^T W^-1 b with W the Gramian, in all units of length, mass and
+    time; 1e-36 N^2 s is as well minimized as 1e6."""
+    def exact(a: float, m: float, k: float, T: float) -> float:
+        A, B = np.array([[0, 1], [-k / m * T**2, 0]]), np.array([[0], [1.0]])  # of x and x' T over shares of T; F T^2/m
+        flow = scipy.linalg.expm(np.block([[-A, B @ B.T], [np.zeros((2, 2)), A.T]]))
+        W = flow[2:, 2:].T @ flow[:2, 2:]
+        return float(np.linalg.inv(W)[0, 0] * a**2 * m**2 / T**3)
+
+    for a, m, T in ((1, 1, 1), (1e-3, 1, 1), (1e-6, 1, 1), (1e-9, 1, 1), (1e3, 1, 1), (1e-9, 1e-9, 1e-2), (1e6, 1e5, 1e4)):
+        k = 20 * m / T**2
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", sd.OptimumWarning)
+            found = sd.optimize(sprung(), EFFORT, T, end={"x": a, "x_dot": 0}, params={"m": m, "k": k}, **options)
+        least = exact(a, m, k, T)
+        assert found.success and found.cost == pytest.approx(least, rel=near, abs=0), (a, m, T)
+        assert found.simulated is not None and abs(found.simulated.x[-1, 0] / a - 1) < 2e-3
+        assert found.integrated_cost == pytest.approx(found.cost, rel=1e-3, abs=0)
+
+
+def test_conditions_of_small_motions() -> None:
+    """In units of nanometres: bounds, free duration, a path condition and an end that cannot be reached."""
+    params, a = {"m": 1e-12, "k": 0}, 1e-9
+    small = functools.partial(sd.optimize, sprung(), params=params, tolerance=None)
+    force = 1e-12 * a / 1e-6  # over a in 2 ms
+    found = small(sd.Loss(end=sd.t), (1e-4, 1e-2), end={"x": a, "x_dot": 0}, bounds={"F": (-force, force)})
+    assert found.duration == pytest.approx(2e-3, rel=1e-5)
+    v = sp.Symbol("x_dot")
+    slow = small(EFFORT, 2e-3, end={"x": a, "x_dot": 0}, path=[v <= sp.Float(0.6e-6)])
+    assert slow["x_dot"].max() == pytest.approx(0.6e-6, rel=1e-6)
+    with pytest.raises(sd.NoOptimum, match=r"Of the nearest motion x = 1e-09 at t = 0.001 s is missed by 7.5e-10"):
+        small(EFFORT, 1e-3, end={"x": a, "x_dot": 0}, bounds={"F": (-force, force)})
+
+
 def test_free_parameter() -> None:
     """From rest to rest over d in T the effort is 12 m^2 d^2/T^3; with m^-2 as the cost of lightness m^4 = T^3/(12 d^2)."""
     for options in ({}, {"transcription": "radau"}, {"transcription": "shooting"}, {"method": "slsqp", "intervals": 4}):
@@ -473,7 +520,7 @@ def test_a_disturbed_swing_up_ends_where_it_should_by_its_regulator() -> None:
 def test_what_is_printed_and_drawn(tmp_path: Any) -> None:
     found = swing_up(tolerance=1e-6)
     text = str(found)
-    for part in ("cost 58.807", "Hermite-Simpson, 3 meshes", "simulated back", "iterations"):
+    for part in ("cost 58.807", "Hermite-Simpson, 4 meshes", "simulated back", "iterations"):
         assert part in text
     assert repr(found) == text and found["q1"] is not None and found[F].shape == found.t.shape
     figure = found.plot(tmp_path / "swing.png")
