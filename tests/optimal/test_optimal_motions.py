@@ -162,6 +162,14 @@ def test_small_and_large_motions(options: dict[str, Any], near: float) -> None:
         assert found.integrated_cost == pytest.approx(found.cost, rel=1e-3, abs=0)
 
 
+def test_small_and_large_costs() -> None:
+    """The same motion whatever its cost is counted in."""
+    x, v = sp.symbols("x x_dot")
+    costs = [sd.optimize(slider(), sd.Loss(integral=c * (F**2 + 100 * x**4), end=c * v**2), 1.0, end={"x": 1}).cost / c
+             for c in (1.0, 1e-18, 1e-36, 1e18)]
+    assert max(costs) - min(costs) < 1e-9 * costs[0] and 10 < costs[0] < 20
+
+
 def test_conditions_of_small_motions() -> None:
     """In units of nanometres: bounds, free duration, a path condition and an end that cannot be reached."""
     params, a = {"m": 1e-12, "k": 0}, 1e-9
