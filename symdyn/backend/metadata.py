@@ -203,6 +203,7 @@ class ModuleMetadata(Metadata):
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
     connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line")
+    acting                 forces and torques of loads, row by row of applied_loads: name, body, kind ("force", "torque")
     down                   direction of gravity, zero where there is none
     output_units           of outputs that are points
     contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord; contact_groups: see GroupRecord
@@ -232,6 +233,7 @@ class ModuleMetadata(Metadata):
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     connections: tuple[tuple[str, str, str, str], ...] = ()
+    acting: tuple[tuple[str, str, str], ...] = ()
     down: tuple[float, float, float] = (0.0, 0.0, 0.0)
     output_units: Mapping[str, str] = field(default_factory=dict)
     contacts: tuple[ContactRecord, ...] = ()

@@ -164,7 +164,7 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--motion", action="store_true", help="simulate, and play the motion")
     parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="with --motion, END or START END, s (default: the "
                         "system's)")
-    parser.add_argument("--forces", action="store_true", help="with --motion, forces in the joints as arrows")
+    parser.add_argument("--forces", action="store_true", help="with --motion, forces in the joints and of loads as arrows")
     for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1")):
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
     parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")

@@ -87,6 +87,7 @@ class Equations:
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
     down         direction of gravity, zero where there is none
     connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force, line)
+    acting       forces and torques of loads on bodies, in the order of the quantity applied_loads: name, body, kind
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     events       what is looked for along a motion (see model.event), in the order of the quantity events
@@ -120,6 +121,7 @@ class Equations:
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     connections: tuple[tuple[str, str, str, str], ...] = ()
+    acting: tuple[tuple[str, str, str], ...] = ()
     down: tuple[float, float, float] = (0.0, 0.0, 0.0)
     watched: Callable[[], Sequence[Any]] = tuple
     events: tuple[Any, ...] = ()

@@ -79,6 +79,8 @@ FUNCTIONS = _entries(
      "unit axis of every joint, n-frame; zero for one that has none or two", _BODIES),
     ("spring_points", "spring_points", None,
      "both ends of every spring, damper and force between two points, n-frame, m", "loads between two points"),
+    ("applied_loads", "applied_loads", None,
+     "where every force and torque of a load acts on its body, m, and its vector, N or N m, n-frame", "loads on bodies"),
     ("frames", "frames", ("n_b", "12"), "origin and rotation (row by row) of every body's frame, n-frame", _BODIES),
     ("positions", "positions", None, "centres of mass, n-frame, m", ""),
     ("watches", "watches", None,

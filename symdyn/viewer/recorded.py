@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _SEEN, _TURN = 1.5e-3, 3e-3
 # Rows of a motion, and of its curves, at most.
 _MOST, _CURVES = 40_000, 2_000
+# The function of a module that gives where loads act and how.
+LOADS = "applied_loads"
 # Contacts at heights that differ by less touch a flat ground; of the mechanism's length.
 _FLAT = 1e-3
 
@@ -69,10 +71,7 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     eta = list(dict.fromkeys(c for record in about.flexible for c in record["coordinates"]))
     if eta:
         scene["eta"] = {"names": eta, "values": packed(np.column_stack([solution[c] for c in eta])[order][rows])}
-    if forces and about.reactions and "reactions" in module.functions:
-        found = solution.rows("reactions").reshape(n_t, -1, 6)[order][rows][..., :3]
-        scene["forces"] = {"joints": list(about.reactions), "values": packed(np.nan_to_num(found).reshape(len(rows), -1)),
-                           "largest": float(np.abs(np.nan_to_num(found)).max(initial=0.0))}
+    scene |= _forces(solution, order[rows]) if forces else {}
     at, pushes = touching(solution)
     if at.shape[1] and usual(pushes):
         both = np.nan_to_num(np.concatenate([at, pushes], axis=2)[order][rows])
@@ -80,6 +79,33 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
                              "length": LENGTH, "longest": LONGEST}
         scene["ground"] = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
     return scene
+
+
+def _forces(solution: Solution, rows: np.ndarray) -> dict[str, Any]:
+    """Forces in joints and those of loads, to one scale, and torques of loads; what is zero all the time is left out."""
+    module, about, n_t = solution.module, solution.module.metadata, len(solution.t)
+    found: dict[str, Any] = {}
+    if about.reactions and "reactions" in module.functions:
+        values = np.nan_to_num(solution.rows("reactions").reshape(n_t, -1, 6)[rows][..., :3])
+        found["forces"] = {"joints": list(about.reactions), "values": packed(values.reshape(len(rows), -1)),
+                           "largest": _largest(values)}
+    if LOADS in module.functions:
+        values = np.nan_to_num(solution.rows(LOADS).reshape(n_t, -1, 6)[rows])
+        there = [k for k in range(len(about.acting)) if values[:, k, 3:].any()]
+        if there:
+            kinds = [about.acting[k][2] for k in there]
+            values = values[:, there]
+            largest = {kind: _largest(values[:, [k == kind for k in kinds], 3:]) for kind in ("force", "torque")}
+            common = max(largest["force"], found.get("forces", {}).get("largest", 0.0))
+            found["loads"] = {"names": [f"{about.acting[k][0]} on {about.acting[k][1]}" for k in there], "kinds": kinds,
+                              "values": packed(values.reshape(len(rows), -1)), "largest": {**largest, "force": common}}
+            if "forces" in found:
+                found["forces"]["largest"] = common
+    return found
+
+
+def _largest(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=-1).max(initial=0.0))
 
 
 def _locals(hung: Hung) -> list[list[float]]:

@@ -76,10 +76,11 @@ function toolbar(parent, stage, live) {
     if (live) return;
     choice(parent, "trail ", [[-2, "none"], [-1, "all"], ...bodies], k => { stage.trail = k; stage.invalidate(); });
     const some = name => stage.scenes.some(s => s.source[name]);
-    if (!some("forces") && !some("contacts")) return;
+    if (!some("forces") && !some("contacts") && !some("loads")) return;
     if (some("forces")) layer("forces", "forces in joints");
+    if (some("loads")) layer("loads", "loads");
     if (some("contacts")) layer("contacts", "contacts");
-    slider(parent, { name: "length of arrows", least: 0.1, most: 4, value: 1 }, (v, show) => { stage.forceScale = v; show(v); stage.invalidate(); });
+    slider(parent, { name: "length of arrows", least: 0.1, most: 10, value: 1 }, (v, show) => { stage.forceScale = v; show(v); stage.invalidate(); });
 }
 
 function liveControls(parent, stage, scene, say) {

@@ -156,6 +156,7 @@ class Recorded extends Source {
         this.quaternions = columnsOf(data.turns);
         this.etas = data.eta ? columnsOf(data.eta.values) : [];
         this.forces = data.forces ? columnsOf(data.forces.values) : null;
+        this.loads = data.loads ? columnsOf(data.loads.values) : null;
         this.contacts = data.contacts ? columnsOf(data.contacts.values) : null;
         this.seek(this.t[0]);
     }
@@ -190,6 +191,7 @@ class Recorded extends Source {
         this.data.axes.forEach((p, k) => this.axes.set(this.world(...p, true), 3 * k));
         this.etas.forEach((column, k) => { this.eta[this.data.eta.names[k]] = between(column); });
         if (this.forces) this.force = this.forces.map(between);
+        if (this.loads) this.load = this.loads.map(between);
         // Contacts open and close: between two times the nearer one holds.
         if (this.contacts) this.touch = this.contacts.map(column => column[w < 0.5 ? a : b]);
     }

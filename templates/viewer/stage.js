@@ -14,7 +14,7 @@ class Stage {
         this.ahead = this.planar ? [0, 0, 1] : Math.abs(this.up[0]) > 0.9 ? [0, 1, 0] : [1, 0, 0];
         this.side = cross(this.up, this.ahead);
         this.length = Math.max(...scenes.map(s => s.data.length));
-        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true, contacts: true };
+        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true, loads: true, contacts: true };
         this.forceScale = 1;
         this.follow = -1;
         this.trail = -2;
@@ -167,6 +167,7 @@ class Stage {
                 [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length]), unitScale, colorOf(w.color), 1, 2, 0.4);
         }
         if (this.layers.forces && source.force) this.drawForces(scene);
+        if (this.layers.loads && source.load) this.drawLoads(scene);
         if (this.layers.contacts && source.touch) this.drawContacts(scene);
     }
 
@@ -259,10 +260,24 @@ class Stage {
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
 
+    // Metres of an arrow by its newtons or newton metres: the largest one of the motion has the same length in every picture.
+    scaleOf(largest) {
+        return 0.35 * this.length * this.forceScale / (largest || 1);
+    }
+
     drawForces(scene) {
-        const { source, data } = scene, scale = 0.35 * this.length * this.forceScale / (data.forces.largest || 1), color = colorOf("#B45309");
+        const { source, data } = scene, scale = this.scaleOf(data.forces.largest), color = colorOf("#B45309");
         data.forces.joints.forEach((name, j) => this.arrow(scene, source.at(2 * j + 1), source.force.slice(3 * j, 3 * j + 3), scale, color,
             `force of ${name}`));
+    }
+
+    // Forces and torques of loads on their bodies, at the points where they act.
+    drawLoads(scene) {
+        const { source, data } = scene, { names, kinds, largest } = data.loads;
+        names.forEach((name, k) => {
+            const at = source.load.slice(6 * k, 6 * k + 3), f = source.load.slice(6 * k + 3, 6 * k + 6), turns = kinds[k] === "torque";
+            this.arrow(scene, at, f, this.scaleOf(largest[kinds[k]]), colorOf(turns ? "#7C3AED" : "#047857"), name, turns);
+        });
     }
 
     // Forces of contacts on their first bodies; the usual one has the same length as in stills.
@@ -274,14 +289,17 @@ class Stage {
         });
     }
 
-    arrow(scene, a, f, scale, color, name) {
+    // A torque has a second head.
+    arrow(scene, a, f, scale, color, name, turns = false) {
         const n = size(f);
         if (n * scale < 0.01 * this.length) return;
-        const b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5), neck = add(b, f, -scale * head);
+        const b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5 / (1 + turns));
+        const neck = add(b, f, -scale * head), second = add(neck, f, -scale * head);
         // Nothing hides a force.
         this.renderer.over(true);
-        this.rod(scene, a, neck, [r, r], color, `${name}: ${n.toPrecision(4)} N`);
+        this.rod(scene, a, turns ? second : neck, [r, r], color, `${name}: ${n.toPrecision(4)} ${turns ? "N m" : "N"}`);
         this.rod(scene, neck, b, [2.4 * r, 0.01 * r], color);
+        if (turns) this.rod(scene, second, neck, [2.4 * r, 0.01 * r], color);
         this.renderer.over(false);
     }
 

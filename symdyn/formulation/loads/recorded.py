@@ -76,22 +76,9 @@ class Loads:
 
     def applied(self, conservative: bool = True, other: bool = True) -> Applied:
         """All loads but gravity; conservative are springs, elastic bodies, and what elements have a potential for."""
-        result = Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)), self.tree.poses,
-                         [(zeros(3), zeros(3)) for _ in self.tree.poses])
+        result = self._nothing()
         for load in self.model.loads:
-            with self.algebra.section(f"load {load.label}"):
-                if isinstance(load, SpringDamper):
-                    self._spring(result, load, conservative, other)
-                elif isinstance(load, Element):
-                    self._element(result, load, conservative, other)
-                elif other and isinstance(load, Force):
-                    self._force(result, load)
-                elif other and isinstance(load, Torque):
-                    self._torque(result, load)
-                elif other and isinstance(load, JointForce):
-                    self._joint(result, load)
-                elif other and isinstance(load, ForceBetween):
-                    self._between(result, load)
+            self._add(result, load, conservative, other)
         for body in self.tree.flexible:
             with self.algebra.section(f"link {self.tree.links[body.link].name}: elastic forces and damping"):
                 places = slice(body.speeds.start, body.speeds.stop)
@@ -100,6 +87,31 @@ class Loads:
                 if other:
                     result.joint[places] -= body.damping @ body.eta_dot
         return result
+
+    def of_one(self, load: Any) -> Applied:
+        """One load alone."""
+        result = self._nothing()
+        self._add(result, load, True, True)
+        return result
+
+    def _nothing(self) -> Applied:
+        return Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)), self.tree.poses,
+                       [(zeros(3), zeros(3)) for _ in self.tree.poses])
+
+    def _add(self, result: Applied, load: Any, conservative: bool, other: bool) -> None:
+        with self.algebra.section(f"load {load.label}"):
+            if isinstance(load, SpringDamper):
+                self._spring(result, load, conservative, other)
+            elif isinstance(load, Element):
+                self._element(result, load, conservative, other)
+            elif other and isinstance(load, Force):
+                self._force(result, load)
+            elif other and isinstance(load, Torque):
+                self._torque(result, load)
+            elif other and isinstance(load, JointForce):
+                self._joint(result, load)
+            elif other and isinstance(load, ForceBetween):
+                self._between(result, load)
 
     def potential(self) -> Any:
         """Potential energy of springs, elements and elastic bodies, J."""

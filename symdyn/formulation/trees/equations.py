@@ -82,7 +82,8 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   contacts=model.contacts, compliant=model.compliant, contact_groups=model.groups,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
-                  connections=_connections(quantities), down=_down(model),
+                  connections=_connections(quantities),
+                  acting=tuple(one.record for one in quantities.acting), down=_down(model),
                   flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),
                   **more)
 

@@ -14,6 +14,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.formulation.accelerations import Motion
 from symdyn.formulation.identification.quantities import Identification
+from symdyn.formulation.loads.acting import Acting, acting, applied_loads
 from symdyn.formulation.loads.contact_groups import spheres
 from symdyn.formulation.loads.contacts import ContactRows
 from symdyn.formulation.loads.implicit import Settled, solve
@@ -131,6 +132,8 @@ class TreeQuantities(Motion):
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         if self.connections:
             own["spring_points"] = self.spring_points
+        if self.acting:
+            own["applied_loads"] = self.applied_loads
         if self.model.compliant:
             own["compliant_contacts"] = self.compliant_contacts
         deep = any(contact.depth is not None for contact in self.model.compliant)
@@ -249,6 +252,15 @@ class TreeQuantities(Motion):
             else:
                 rows += [self._on(load.body_a, load.point_a), self._on(load.body_b, load.point_b)]
         return np.array(rows, dtype=object).reshape(-1, 6)
+
+    @property
+    def acting(self) -> tuple[Acting, ...]:
+        """The forces and torques in the rows of `applied_loads`."""
+        return acting(self.model)
+
+    def applied_loads(self) -> np.ndarray:
+        """Where every force and torque of a load acts, m, and its vector, N or N m, n-frame, (n, 6)."""
+        return applied_loads(self.loads, self.acting)
 
     def _on(self, body: Any, point: Any) -> Any:
         """A point of a body in the n-frame."""
