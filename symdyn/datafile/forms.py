@@ -139,5 +139,5 @@ ASSUMPTIONS = ("positive", "negative", "nonnegative", "nonpositive", "nonzero", 
                "extended_negative", "extended_nonzero", "extended_nonnegative", "extended_nonpositive")
 # What drawn shapes of pictures hold, by `kind`: lengths (rows of expressions), and what is no number.
 DRAWN = {"box": (("size", "center", "hole"), ()), "sweep": (("points", "widths", "direction"), ()),
-         "line": (("points", "end"), ("width", "to")), "water": (("level", "size", "center"), ())}
+         "line": (("points", "end"), ("width", "to")), "water": (("level", "size", "center", "waves"), ())}
 OUTPUT_POINTS = ("position", "velocity", "acceleration", "jacobian", "bias_acceleration")

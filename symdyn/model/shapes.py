@@ -198,16 +198,31 @@ class Mesh(Shape):
 
 @dataclass(frozen=True)
 class Water(Shape):
-    """The water surface z = level of the n-frame, for the ground; size: (2,) along x and y, m, or None: the whole picture."""
+    """The water surface z = level of the n-frame, for the ground; size: (2,) along x and y, m, or None: the whole picture.
+
+    waves   regular ones, which pages show: (amplitude, frequency, length) or (amplitude, frequency, length, heading, ramp), in m,
+            rad/s, m, rad, s: the surface is amplitude cos(frequency t - 2 pi s / length) above the level, s along the heading,
+            which is an angle from x about z; within the time of the ramp it grows from nothing, by (1 - cos(pi t / ramp)) / 2;
+            without a ramp, or with 0, it is there at once
+    """
 
     size: Any = None
     level: Any = 0
     center: Any = (0, 0)
+    waves: Any = None
 
     def values(self, faults: Faults, what: str, planar: bool) -> dict[str, tuple[Row, ...]]:
         if planar:
             faults.append(f"{what}: a water surface z = level is in sight in systems in space only; leave it out")
         found: dict[str, tuple[Row, ...]] = {"level": ((faults.expression(self.level, f"{what}: level"),),)}
+        if self.waves is not None:
+            waves = faults.expressions(self.waves, f"{what}: waves")
+            if len(waves) not in (3, 5):
+                faults.append(f"{what}: waves has {len(waves)} entries; pass (amplitude, frequency, length), or "
+                              "(amplitude, frequency, length, heading, ramp)")
+            else:
+                _positive(faults, waves[2:3], f"{what}: length of waves")
+                found["waves"] = (waves if len(waves) == 5 else (*waves, sp.S.Zero, sp.S.Zero),)
         if self.size is None:
             return found
         size = faults.expressions(self.size, f"{what}: size")

@@ -28,11 +28,15 @@ _SAMPLES = 60
 
 @dataclass(frozen=True)
 class Water:
-    """A water surface: level, and its rectangle (2, 2) from lower to upper along x and y, or None for the whole picture."""
+    """A water surface: level, and its rectangle (2, 2) from lower to upper along x and y, or None for the whole picture.
+
+    waves   amplitude (m), frequency (rad/s), length (m), heading (rad) and ramp (s) of regular ones, or None: it is at rest
+    """
 
     level: float
     reach: np.ndarray | None
     color: tuple[float, float, float]
+    waves: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -160,10 +164,11 @@ def filled(records: Sequence[Mapping[str, Any]], lengths: np.ndarray) -> list[Ma
 def water_of(record: Mapping[str, Any], name: str) -> Water:
     """The water surface of a record; name: of the mechanism, for messages."""
     values, color = record["values"], color_of(record["color"] or _WATER_COLOR, name)
+    waves = tuple(values["waves"][0]) if "waves" in values else None
     if "size" not in values:
-        return Water(values["level"][0][0], None, color)
+        return Water(values["level"][0][0], None, color, waves)
     center, half = np.array(values["center"][0]), np.array(values["size"][0]) / 2
-    return Water(values["level"][0][0], np.array([center - half, center + half]), color)
+    return Water(values["level"][0][0], np.array([center - half, center + half]), color, waves)
 
 
 def color_of(given: Any, name: str) -> tuple[float, float, float]:

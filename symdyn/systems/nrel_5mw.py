@@ -134,9 +134,12 @@ DAMPING = Coefficients(3.4e4, 3.4e4, 3.6e6, 3.0e8, 3.0e8, 2.0e7)
 
 
 WAVE_FREQUENCY = 2 * math.pi / 10.0  # rad/s
+WAVE_AMPLITUDE = 1.0  # m
+WAVE_LENGTH = 2 * math.pi * GRAVITY / WAVE_FREQUENCY**2  # m, in deep water
+SEA = (160, 160)  # m, of which pictures show the surface
 
 
-def wave_excitation(amplitude: float = 1.0, frequency: float = WAVE_FREQUENCY,
+def wave_excitation(amplitude: float = WAVE_AMPLITUDE, frequency: float = WAVE_FREQUENCY,
                     draft: float = 4.0) -> tuple[Coefficients, Coefficients]:
     """Amplitudes (N, N m) and phases (rad) of the force about O of a regular wave along x, amplitude cos(frequency t) at O.
 

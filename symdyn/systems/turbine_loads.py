@@ -6,6 +6,7 @@ import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.elements import AddedMass, Box, Buoyancy, Drag, LinearDamping, LinearStiffness, Thrust, WaveExcitation
+from symdyn.model.shapes import Water
 from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
 from symdyn.systems import nrel_5mw as nrel
@@ -80,9 +81,10 @@ def add_wind(system: System, tower: Body, nacelle: Body, hub: Body) -> None:
 
 
 def add_waves(system: System, platform: Body) -> None:
-    """Force of a regular wave along x on the barge."""
+    """Force of a regular wave along x on the barge, and what it looks like."""
     amplitude, phase = nrel.wave_excitation()
     omega, ramp = given(system, omega_w=nrel.WAVE_FREQUENCY, T_0=20.0)
     forces = [given(system, **{f"F_w_{name}": value})[0] if value else 0 for name, value in amplitude._asdict().items()]
     phases = [sp.pi / 2 if value else 0 for value in phase]
     system.add_load(WaveExcitation(platform, forces, phases, omega, ramp=ramp, name="waves"))
+    system.draw(system.ground, Water(nrel.SEA, waves=(nrel.WAVE_AMPLITUDE, omega, nrel.WAVE_LENGTH, 0, ramp)))

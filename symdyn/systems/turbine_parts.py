@@ -35,8 +35,8 @@ def given(system: System, **numbers: float) -> list[sp.Symbol]:
     return symbols
 
 
-def add_platform(system: System, orientation: str, ballast: bool) -> Body:
-    """The barge, free to move, with its water."""
+def add_platform(system: System, orientation: str, ballast: bool, waves: bool) -> Body:
+    """The barge, free to move, with its water, whose surface is drawn with the waves where there are some."""
     m, z, *I = given(system, m_P=nrel.PLATFORM_MASS, z_P=nrel.PLATFORM_COM, I_P_x=nrel.PLATFORM_INERTIA[0],
                      I_P_y=nrel.PLATFORM_INERTIA[1], I_P_z=nrel.PLATFORM_INERTIA[2])
     com: list[Any] = [0, 0, z]
@@ -45,7 +45,8 @@ def add_platform(system: System, orientation: str, ballast: bool) -> Body:
         com = [m_x * l_x / m, m_y * l_x / m, z]
     platform = system.add_body("platform", mass=m, com=com, inertia=I)
     system.draw(platform, shapes.Box(nrel.HULL, (0, 0, nrel.HULL_CENTER), nrel.MOONPOOL[:2]), color="#c8553d")
-    system.draw(system.ground, shapes.Water((160, 160)))
+    if not waves:
+        system.draw(system.ground, shapes.Water(nrel.SEA))
     joint: Joint
     if orientation == "angles":
         q = coordinates("x y z psi theta phi")

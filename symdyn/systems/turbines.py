@@ -86,7 +86,7 @@ def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientatio
                "added_mass": added_mass, "damping": damping, "wind": wind, "waves": waves, "drives": drives, "ballast": ballast,
                "flexible": flexible}
     system = _system("floating_wind_turbine", options)
-    platform = add_platform(system, orientation, ballast)
+    platform = add_platform(system, orientation, ballast, waves)
     tower, top, at = add_tower(system, platform, flexible in (True, "tower"))
     nacelle, hub = add_machine(system, top, at, rotor, blades, flexible in (True, "blades"))
     if drives:

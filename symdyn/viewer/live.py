@@ -141,7 +141,8 @@ def _sliders(equations: Equations, values: dict[str, float], names: Sequence[str
                     (value - math.pi, value + math.pi) if s.units.get(p) == "rad" else (value - length, value + length))
             found.append(_slider(group, k, p.name, s.units.get(p, ""), value, min(ends), max(ends),
                                  p.name in used and p.name not in fixed))
-    found.append(_slider("t", 0, "t", "s", 0.0, 0.0, s.duration, "t" in used))
+    waves = any("waves" in record["values"] for record in equations.drawn)
+    found.append(_slider("t", 0, "t", "s", 0.0, 0.0, s.duration, waves or "t" in used))
     return found
 
 

@@ -105,5 +105,5 @@ def _threads(part: Part, m: Mechanism, color: str, length: float) -> list[dict[s
 
 
 def _water(water: Water) -> dict[str, Any]:
-    return {"level": water.level, "color": to_hex(water.color),
+    return {"level": water.level, "color": to_hex(water.color), "waves": water.waves,
             "reach": None if water.reach is None else [[float(v) for v in row] for row in water.reach]}

@@ -55,6 +55,8 @@ class Live extends Source {
         this.update();
     }
 
+    get time() { return this.values.t[0] || 0; }
+
     state(q = this.values.q) {
         const v = this.values, at = { q, p: v.p, inputs: v.inputs, t: v.t[0], u: v.u, z: v.z, ud: v.ud };
         at.c = this.functions.prologue(at);

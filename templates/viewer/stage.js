@@ -1,5 +1,7 @@
 // What is seen: a camera that turns, the solids of one mechanism or of several beside each other, names under the pointer.
 const FIELD = 0.6;
+// Of a side of the water, where it has waves.
+const FACETS = 48;
 const AXES = [["x", "#D55E00"], ["y", "#009E73"], ["z", "#0072B2"]];
 
 class Stage {
@@ -160,15 +162,35 @@ class Stage {
         });
         this.drawTrails(scene);
         if (this.layers.inertia) for (const item of scene.items) if (item.kind === "ellipsoid") this.drawItem(scene, item);
-        if (data.water) {
-            const w = data.water, r = 4 * this.radius, [x, y] = this.home.target;
-            const [[x0, y0], [x1, y1]] = w.reach || [[x - r, y - r], [x + r, y + r]];
-            renderer.draw(library.box, placed([1, 0, 0], [0, 1, 0], [0, 0, 1], [(x0 + x1) / 2, (y0 + y1) / 2, w.level],
-                [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length]), unitScale, colorOf(w.color), 1, 2, 0.4);
-        }
+        if (data.water) this.drawWater(scene);
         if (this.layers.forces && source.force) this.drawForces(scene);
         if (this.layers.loads && source.load) this.drawLoads(scene);
         if (this.layers.contacts && source.touch) this.drawContacts(scene);
+    }
+
+    drawWater(scene) {
+        const { water: w } = scene.data, r = 4 * this.radius, [x, y] = this.home.target;
+        const [[x0, y0], [x1, y1]] = w.reach || [[x - r, y - r], [x + r, y + r]];
+        const middle = [(x0 + x1) / 2, (y0 + y1) / 2, w.level], half = [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length];
+        const mesh = w.waves ? this.surfaceOf(scene, w, middle, half) : this.library.box, one = [1, 1, 1];
+        this.renderer.draw(mesh, placed([1, 0, 0], [0, 1, 0], [0, 0, 1], middle, w.waves ? one : half), one, colorOf(w.color), 1,
+            w.waves ? 0 : 2, w.waves ? 0.55 : 0.4);
+    }
+
+    // The water's surface now, about its middle: regular waves along a heading.
+    surfaceOf(scene, { waves }, middle, half) {
+        const [amplitude, frequency, long, heading, ramp] = waves, { time } = scene.source, k = TURN / long;
+        const grown = amplitude * (ramp > 0 ? (1 - Math.cos(Math.PI * Math.max(0, Math.min(1, time / ramp)))) / 2 : 1);
+        const way = [Math.cos(heading), Math.sin(heading)];
+        const [vertices, triangles] = surface(FACETS, FACETS, (u, v) => {
+            const x = (2 * u - 1) * half[0], y = (2 * v - 1) * half[1];
+            const phase = frequency * time - k * (way[0] * (middle[0] + x) + way[1] * (middle[1] + y));
+            const slope = grown * k * Math.sin(phase);
+            return [x, y, grown * Math.cos(phase), -slope * way[0], -slope * way[1], 1];
+        });
+        if (scene.water) this.renderer.change(scene.water, vertices);
+        else scene.water = this.renderer.mesh(vertices, triangles, true);
+        return scene.water;
     }
 
     rod(scene, a, b, radii, color, name, mesh = "rod") {
