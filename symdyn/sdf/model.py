@@ -23,7 +23,7 @@ GRAVITY = (0.0, 0.0, -9.8)
 @dataclass(frozen=True)
 class SdfLink:
     """Mass, kg; pose of the centre of mass; inertia about it in the axes of that pose, kg m^2, as INERTIA; whether it has
-    weight."""
+    weight; its <visual> elements."""
 
     name: str
     mass: float
@@ -31,6 +31,7 @@ class SdfLink:
     inertia: tuple[float, ...]
     weight: bool
     line: int
+    visuals: tuple[Element, ...]
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,8 @@ class Parser:
             if written is not None:
                 entries = [f.number_in(written, tag, what, 1.0 if tag[1] == tag[2] else 0.0) for tag in INERTIA]
         model.links[name] = SdfLink(name, mass, center, tuple(entries), not (
-            element.find("gravity") is not None and not f.true(element, "gravity")), element.line)
+            element.find("gravity") is not None and not f.true(element, "gravity")), element.line,
+            tuple(element.all("visual")))
         for collision in element.all("collision"):
             model.left.setdefault("contacts", []).append((name, collision.line))
 

@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
+from symdyn.kinds import flag
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed, Free, Joint, Prismatic, Revolute, Spherical, Universal
 from symdyn.model.orientation import EulerParameters
@@ -20,6 +21,7 @@ from symdyn.model.system import System
 from symdyn.sdf.frames import WORLD
 from symdyn.sdf.model import Parser, SdfJoint, SdfModel
 from symdyn.sdf.values import KIND, Values
+from symdyn.sdf.visuals import Visuals
 from symdyn.shown import shown
 from symdyn.urdf.document import as_path, read_document
 from symdyn.urdf.parameters import Names, Parameters, plain
@@ -34,7 +36,8 @@ _SHOWN = 4
 
 
 def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "file", name: str | None = None,
-             fixed: str | Sequence[str] = (), leave_out: str | Sequence[str] = ()) -> System:
+             fixed: str | Sequence[str] = (), leave_out: str | Sequence[str] = (), visuals: bool = False,
+             folder: str | Path | None = None) -> System:
     """The mechanism that a model in SDFormat describes, versions 1.4 to 1.12: of the file, or of its one world.
 
     symbolic   what becomes a parameter instead of a number, the number of the file its default: m_LINK, c_x_LINK, I_xx_LINK,
@@ -44,6 +47,10 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     name       of the system; default: the model's
     fixed      names of joints, with * and ?, that are held where their coordinates are zero
     leave_out  what no warning is to report: "contacts", "limits", "friction", "plugins", with * and ?
+    visuals    whether bodies look in pictures as <visual> draws them: boxes, spheres, ellipsoids, cylinders, capsules, cones and
+               meshes (STL, OBJ, DAE, read by trimesh), each with 800 triangles at most, in the diffuse colour of <material>, or
+               those of a DAE's own materials; planes are left out
+    folder     that no mesh may be outside of, and where model:// begins; default: that of the file
 
     Poses may be relative to links, joints, nested models and frames, axes expressed in them. Bodies are the links; those of
     nested models are called inner::link. Coordinates are q_JOINT (universal: q_JOINT_1, q_JOINT_2; ball: e0_ ... e3_JOINT;
@@ -54,8 +61,8 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     m^2, and the world without <gravity> 9.8 m/s^2 along -z, as the format has it.
 
     Raises ModelError that lists every fault of the file with its line: of values, of frames, screws and gearboxes, files that are
-    brought in; ArgumentError for arguments; MissingExtra without defusedxml. Warns (ModelWarning) of collisions, limits, friction
-    and plugins. Source of the format: sdformat.org, specification and "Pose frame semantics".
+    brought in; ArgumentError for arguments; MissingExtra without defusedxml, with meshes without trimesh. Warns (ModelWarning) of
+    collisions, limits, friction and plugins. Source of the format: sdformat.org, specification and "Pose frame semantics".
 
     >>> import tempfile, pathlib
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "bar.sdf"
@@ -66,6 +73,7 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     Matrix([[m_bar/4 + 1]])
     """
     wanted, held, silent = patterns(symbolic, "symbolic"), patterns(fixed, "fixed"), patterns(leave_out, "leave_out")
+    flag(visuals, "visuals")
     if not isinstance(root, str) or root not in ROOTS:
         raise ArgumentError(f"root is {shown(root)}; pass 'file', 'fixed' or 'floating'")
     taken = as_path(path, KIND)
@@ -81,6 +89,9 @@ def read_sdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = "
     builder = _Builder(model, faults, system_name(model.name or taken.stem) if name is None else name, wanted, held)
     system = builder.system(root)
     faults += builder.parameters.faults()
+    if visuals:
+        inside = taken.parent if folder is None else as_path(folder, "the folder of an SDF")
+        Visuals(faults, inside).draw(model, builder.bodies, system)
     if faults:
         raise ModelError(faults, model.name)
     _report(model, silent, taken)

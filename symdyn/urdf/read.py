@@ -48,7 +48,7 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     fixed      names of joints, with * and ?, that are held where their coordinate is zero
     damping    whether joints with one coordinate of their own have the viscous damping of <dynamics>
     visuals    whether bodies look in pictures as <visual> draws them: boxes, spheres, cylinders and meshes (STL, OBJ, DAE, read
-               by trimesh), each with 800 triangles at most
+               by trimesh), each with 800 triangles at most; in the colour of <material>, or those of a DAE's own materials
     folder     that no mesh may be outside of, and where package:// begins; default: that of the file
 
     Bodies are the links, with the links' frames. A joint's coordinate is q_JOINT (planar: x_, y_, theta_JOINT; floating: x_,

@@ -14,7 +14,8 @@ from symdyn.model.system import System
 from symdyn.shown import shown
 from symdyn.urdf.angles import rotation
 from symdyn.urdf.document import Element
-from symdyn.urdf.meshes import Triangles, box, cylinder, decimated, ellipsoid, loaded
+from symdyn.urdf.mesh_files import MeshFiles
+from symdyn.urdf.meshes import Piece, box, cylinder, ellipsoid
 from symdyn.urdf.robot import ZERO
 from symdyn.urdf.values import FileFaults
 
@@ -23,7 +24,7 @@ class Visuals:
     """Draws links; folder: that no mesh may be outside of."""
 
     def __init__(self, faults: FileFaults, folder: Path) -> None:
-        self.faults, self.base, self.folder = faults, faults.path.parent, folder.resolve()
+        self.faults, self.files = faults, MeshFiles(faults, folder)
 
     def draw(self, root: Element, bodies: Mapping[str, Body], system: System) -> None:
         materials = {e.attributes.get("name"): e for e in root.all("material")}
@@ -33,64 +34,36 @@ class Visuals:
                 continue
             for visual in link.all("visual"):
                 what = f"link {shown(link.attributes['name'])}: <visual>"
-                found = self._triangles(visual.find("geometry"), visual, what)
-                if found is None:
+                pieces = self._pieces(visual.find("geometry"), visual, what)
+                if not pieces:
                     continue
                 origin = visual.find("origin")
                 R = np.array(rotation(self.faults.triple(origin, "rpy", what, ZERO)))
-                vertices = found[0] @ R.T + np.array(self.faults.triple(origin, "xyz", what, ZERO))
-                system.draw(body, Mesh(vertices, found[1]), color=self._color(visual, materials, what))
+                p, color = np.array(self.faults.triple(origin, "xyz", what, ZERO)), self._color(visual, materials, what)
+                for piece in pieces:
+                    system.draw(body, Mesh(piece.vertices @ R.T + p, piece.faces), color=color or piece.color)
 
-    def _triangles(self, geometry: Element | None, visual: Element, what: str) -> Triangles | None:
+    def _pieces(self, geometry: Element | None, visual: Element, what: str) -> list[Piece]:
         f = self.faults
         for shape in () if geometry is None else geometry.children:
             if shape.tag == "box":
-                return box(np.array(f.triple(shape, "size", what, (1.0, 1.0, 1.0))) / 2)
+                return [Piece(*box(np.array(f.triple(shape, "size", what, (1.0, 1.0, 1.0))) / 2))]
             if shape.tag == "sphere":
-                return ellipsoid(np.full(3, f.number(shape, "radius", what)))
+                return [Piece(*ellipsoid(np.full(3, f.number(shape, "radius", what))))]
             if shape.tag == "cylinder":
-                return cylinder(f.number(shape, "radius", what), f.number(shape, "length", what) / 2)
+                return [Piece(*cylinder(f.number(shape, "radius", what), f.number(shape, "length", what) / 2))]
             if shape.tag == "mesh":
                 return self._mesh(shape, what)
             f.at(shape.line, f"{what} has a <{shape.tag}>; read are box, sphere, cylinder and mesh")
-            return None
+            return []
         f.at(visual.line, f"{what} has no <geometry>; leave it out")
-        return None
+        return []
 
-    def _mesh(self, shape: Element, what: str) -> Triangles | None:
+    def _mesh(self, shape: Element, what: str) -> list[Piece]:
         name = self.faults.name(shape, "filename", what)
-        path = self._file(name, shape.line, what) if name else None
-        if path is None:
-            return None
-        try:
-            vertices, faces = decimated(*loaded(path))
-        except ValueError as error:
-            self.faults.at(shape.line, f"{what}: the mesh {shown(name)} {error}")
-            return None
-        return vertices * np.array(self.faults.triple(shape, "scale", what, (1.0, 1.0, 1.0))), faces
-
-    def _file(self, name: str, line: int, what: str) -> Path | None:
-        """The file of a name: after package://NAME/ the path is seen from the folder, with NAME or without, or from a folder NAME
-        that holds the URDF."""
-        inside = name.removeprefix("package://").removeprefix("file://")
-        package, _, rest = inside.partition("/")
-        if name.startswith("package://"):
-            above = next((p for p in self.base.resolve().parents if p.name == package), self.base)
-            candidates = [self.folder / inside, self.folder / rest, above / rest, above.parent / inside]
-        else:
-            candidates = [self.base / inside]
-        found = [c.resolve() for c in candidates]
-        held = [c for c in found if c.is_relative_to(self.folder)]
-        if not held:
-            self.faults.at(line, f"{what}: the mesh {shown(name)} is outside of the folder {self.folder}; pass folder=... with "
-                                 "one that "
-                                 "holds all files of the robot")
-            return None
-        here = next((c for c in held if c.is_file()), None)
-        if here is None:
-            self.faults.at(line, f"{what}: there is no mesh {shown(name)} (looked for {held[0]}); pass folder=..., or "
-                                 "visuals=False")
-        return here
+        found = self.files.pieces(name, shape.line, what) if name else []
+        scale = np.array(self.faults.triple(shape, "scale", what, (1.0, 1.0, 1.0))) if found else 1.0
+        return [Piece(p.vertices * scale, p.faces, p.color) for p in found]
 
     def _color(self, visual: Element, materials: Mapping[Any, Element], what: str) -> list[float] | None:
         material = visual.find("material")

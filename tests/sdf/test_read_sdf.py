@@ -10,6 +10,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError, ModelWarning
+from tests.urdf.texts import collada
 
 pytest.importorskip("defusedxml", reason="defusedxml is not installed; run: pip install 'symdyn[robots]'")
 INERTIAL = ("<inertial><pose>0.1 -0.2 0.3 0.3 -0.4 "
@@ -218,6 +219,81 @@ def test_what_is_not_taken_is_reported(tmp_path: Path) -> None:
     sd.read_sdf(tmp_path / "robot.sdf", leave_out="*")
 
 
+# -- pictures
+
+
+def drawn(folder: Path, visual: str, **given: object) -> sd.System:
+    text = model(BASE, link("seen", f"<visual name='v'>{visual}</visual>"), joint("j", "revolute", "a", "seen", axis("0 0 1")))
+    path = saved(folder, text)
+    return sd.read_sdf(path, visuals=True, **given)
+
+
+def geometry(shape: str) -> str:
+    return f"<geometry>{shape}</geometry>"
+
+
+@pytest.mark.parametrize(("shape", "half"), [
+    ("<box><size>1 2 3</size></box>", (0.5, 1, 1.5)), ("<sphere><radius>2</radius></sphere>", (2, 2, 2)),
+    ("<cylinder><radius>1</radius><length>3</length></cylinder>", (1, 1, 1.5)), ("<cone/>", (0.5, 0.5, 0.5)),
+    ("<capsule><radius>0.5</radius><length>3</length></capsule>", (0.5, 0.5, 2)),
+    ("<ellipsoid><radii>1 2 3</radii></ellipsoid>", (1, 2, 3))])
+def test_solids_are_drawn_where_they_are(tmp_path: Path, shape: str, half: tuple[float, ...]) -> None:
+    """At (0, 0, 1) and turned by 90 degrees about x, so that z becomes -y: y and z change places."""
+    shown, = drawn(tmp_path, f'<pose degrees="1">0 0 1 90 0 0</pose>{geometry(shape)}').shapes
+    vertices = np.array(shown.about["vertices"])
+    x, y, z = half
+    np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], [(-x, -z, 1 - y), (x, z, 1 + y)], atol=1e-12)
+    assert shown.record["body"] == "seen" and shown.color is None
+
+
+def test_places_and_colours_of_visuals(tmp_path: Path) -> None:
+    """A visual may be relative to a joint of its own model; a nested link's names are within its model."""
+    ball = geometry("<sphere><radius>0.1</radius></sphere>")
+    inner = ('<model name="in"><frame name="f"><pose>0 0 5 0 0 0</pose></frame><link name="l"><pose>0 0 1 0 0 0</pose>'
+             '<visual name="v">'
+             f'<pose relative_to="f">1 0 0 0 0 0</pose>{ball}<material><diffuse>1.5 0.5 0 1</diffuse></material></visual>'
+             f'<visual name="w">{ball}<material><ambient>0 0 1</ambient></material></visual>'
+             f'<visual name="gone">{ball}<transparency>1</transparency></visual>'
+             f'<visual name="floor">{geometry("<plane/>")}</visual></link></model>')
+    first, second = sd.read_sdf(saved(tmp_path, model(inner)), visuals=True).shapes
+    assert (first.color, second.color) == ([1.0, 0.5, 0.0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(np.mean(first.about["vertices"], axis=0), [1, 0, 4], atol=1e-4)
+    assert sd.read_sdf(tmp_path / "robot.sdf").shapes == []
+
+
+def test_meshes_of_a_model(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh", reason="trimesh is not installed; run: pip install 'symdyn[meshes]'")
+    pytest.importorskip("collada", reason="pycollada is not installed; run: pip install 'symdyn[meshes]'")
+    folder = tmp_path / "arm" / "meshes"
+    folder.mkdir(parents=True)
+    (folder / "two.dae").write_text(collada())
+    mesh = geometry("<mesh><uri>model://arm/meshes/two.dae</uri><scale>2 1 1</scale></mesh>")
+    shapes = drawn(tmp_path / "arm", mesh).shapes
+    assert sorted(len(s.about["faces"]) for s in shapes) == [1, 1, 2]
+    assert sorted(tuple(np.round(s.color, 2)) for s in shapes if s.color) == [(0, 0, 0.5), (1, 0, 0)]
+    assert max(x for s in shapes for x, _, _ in s.about["vertices"]) == 0.002
+    green, = {tuple(s.color) for s in drawn(tmp_path / "arm", f"{mesh}<material><diffuse>0 1 0 1</diffuse></material>").shapes}
+    assert green == (0, 1, 0)
+
+
+@pytest.mark.parametrize(("visual", "fault"), [
+    ("", "<visual> has no <geometry>; leave it out"),
+    (geometry("<heightmap/>"), "<visual> has a <heightmap>; read are box, sphere, ellipsoid, cylinder, capsule, cone and mesh"),
+    (geometry("<mesh/>"), "<visual> has no <uri>"),
+    (geometry("<mesh><uri>../x.stl</uri></mesh>"), "<visual>: the mesh '../x.stl' is outside of the folder"),
+    (geometry("<mesh><uri>x.stl</uri></mesh>"), "<visual>: there is no mesh 'x.stl'"),
+    (geometry("<mesh><uri>x.stl</uri><submesh><name>y</name></submesh></mesh>"), "<visual> shows a part of a mesh (<submesh>)"),
+    (geometry("<box><size>1 2</size></box>"), "<visual>: text of <size> is '1 2'; give 3 numbers"),
+    (f"<pose relative_to='none'/>{geometry('<cone/>')}", "<visual> refers to the frame 'none', which there is not"),
+    (f"{geometry('<cone/>')}<material><diffuse>red</diffuse></material>", "<visual>: text of <diffuse> is 'red'; give 4 numbers"),
+])
+def test_faults_of_visuals(tmp_path: Path, visual: str, fault: str) -> None:
+    with pytest.raises(ModelError) as raised:
+        drawn(tmp_path, visual)
+    assert raised.value.faults[0].startswith(f"{tmp_path / 'robot.sdf'}:3: link 'seen': {fault}"), raised.value.faults
+    sd.read_sdf(tmp_path / "robot.sdf")  # without pictures nothing is looked at
+
+
 def test_arguments(tmp_path: Path) -> None:
     path = saved(tmp_path, model(BASE))
     for given, fault in (({"fixed": "none"}, "fixed has 'none', which fits no joint"), ({"symbolic": "m_b"},
@@ -228,3 +304,7 @@ def test_arguments(tmp_path: Path) -> None:
     for given, fault in (((7,), "the path is 7; pass that of an SDF file"), ((path, (), "none"), "root is 'none'; pass 'file'")):
         with pytest.raises(ArgumentError, match=fault):
             sd.read_sdf(*given)
+    with pytest.raises(ArgumentError, match="visuals is 'no'; pass True or False"):
+        sd.read_sdf(path, visuals="no")
+    with pytest.raises(ArgumentError, match="the path is 7; pass that of the folder of an SDF file"):
+        sd.read_sdf(path, visuals=True, folder=7)

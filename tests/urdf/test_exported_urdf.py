@@ -11,7 +11,7 @@ import pytest
 import symdyn as sd
 from symdyn.errors import ArgumentError, MissingExtra, ModelError
 from symdyn.urdf.meshes import TRIANGLES, box, capsule, cylinder, decimated, ellipsoid
-from tests.urdf.texts import link, robot, saved
+from tests.urdf.texts import collada, link, robot, saved
 
 pytest.importorskip("defusedxml", reason="defusedxml is not installed; run: pip install 'symdyn[robots]'")
 
@@ -185,6 +185,23 @@ def test_collada_has_the_unit_that_it_states(tmp_path: Path, unit: str, factor: 
     shape, = sd.read_urdf(saved(tmp_path, visual('<mesh filename="box.dae"/>')), visuals=True).shapes
     vertices = np.array(shape.about["vertices"])
     np.testing.assert_allclose(np.ptp(vertices, axis=0), factor * np.array([1, 2, 3]), rtol=1e-12)
+
+
+def test_collada_has_the_colours_of_its_materials(tmp_path: Path) -> None:
+    """Two materials and triangles without one: a mesh for each, unless the robot's file states a colour of its own."""
+    pytest.importorskip("trimesh", reason="trimesh is not installed; run: pip install 'symdyn[meshes]'")
+    pytest.importorskip("collada", reason="pycollada is not installed; run: pip install 'symdyn[meshes]'")
+    (tmp_path / "two.dae").write_text(collada())
+    text = visual('<mesh filename="two.dae" scale="2 1 1"/>')
+    shapes = sd.read_urdf(saved(tmp_path, text), visuals=True).shapes
+    found = {s.color and tuple(round(v, 2) for v in s.color): s.about for s in shapes}
+    assert set(found) == {None, (1.0, 0.0, 0.0), (0.0, 0.0, 0.5)}
+    assert [len(found[c]["faces"]) for c in ((1.0, 0.0, 0.0), (0.0, 0.0, 0.5), None)] == [2, 1, 1]
+    blue = found[0.0, 0.0, 0.5]["vertices"]
+    assert sorted(map(tuple, blue)) == [(0.0, 0.0, 1.1), (0.0, 0.0, 1.101), (0.0, 0.001, 1.1)]
+    assert max(x for x, _, _ in found[1.0, 0.0, 0.0]["vertices"]) == 0.002
+    stated = text.replace("</geometry>", "</geometry><material name='m'><color rgba='0 1 0 1'/></material>")
+    assert {tuple(s.color) for s in sd.read_urdf(saved(tmp_path, stated), visuals=True).shapes} == {(0.0, 1.0, 0.0)}
 
 
 def visual(geometry: str) -> str:

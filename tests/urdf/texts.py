@@ -47,3 +47,35 @@ ALL = robot(
                                                 '<mimic joint="lift" multiplier="-0.5" offset="0.3"/>'),
     joint("close", "prismatic", "finger", "thumb", f'<axis xyz="0 0 1"/>{LIMIT}<mimic joint="push"/>'),
     joint("end", "fixed", "thumb", "tip", '<origin xyz="0 0 0.05" rpy="0 0 0.7"/>'), name="all of them")
+
+
+def collada() -> str:
+    """A tetrahedron of 1 mm edges along x, y and z, 100 mm above the origin: two triangles red, one dark blue, one without a
+    material."""
+    def effect(name: str, color: str) -> str:
+        return (f'<effect id="{name}-e"><profile_COMMON><technique sid="common"><phong><diffuse><color>{color}</color></diffuse>'
+                "</phong></technique></profile_COMMON></effect>")
+
+    def triangles(corners: str, symbol: str = "") -> str:
+        count = len(corners.split()) // 3
+        return f'<triangles count="{count}"{symbol}><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>'
+
+    def bound(symbol: str, target: str) -> str:
+        return f'<instance_material symbol="{symbol}" target="#{target}"/>'
+
+    return f"""<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="mm" meter="0.001"/><up_axis>Z_UP</up_axis></asset>
+<library_effects>{effect("red", "1 0 0 1")}{effect("blue", "0 0 0.5 1")}</library_effects>
+<library_materials><material id="red"><instance_effect url="#red-e"/></material>
+<material id="blue"><instance_effect url="#blue-e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+<technique_common><accessor source="#a" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+{triangles("0 2 1 0 1 3", ' material="first"')}{triangles("0 3 2", ' material="second"')}{triangles("1 2 3")}
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>0 0 100</translate><instance_geometry url="#g">
+<bind_material><technique_common>{bound("first", "red")}{bound("second", "blue")}</technique_common></bind_material>
+</instance_geometry></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
