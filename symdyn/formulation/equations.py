@@ -423,8 +423,9 @@ class Equations:
         name         of a function of a module; those of accelerations, such as "inverse_dynamics", take ud as well
         specialize   parameters, by symbol or name, that become numbers
 
-        x, params and inputs are columns in the order of a module's; the result is NaN where a module raises. Raises MissingExtra
-        without CasADi, SymdynError for a function that the equations do not have.
+        x, params and inputs are columns in the order of a module's (`module.default_parameters` has the defaults so; that of
+        system.defaults may be another); the result is NaN where a module raises. Raises MissingExtra without CasADi, SymdynError
+        for a function that the equations do not have.
 
         >>> f = sd.systems.pendulum().embedding().to_casadi("rhs")
         >>> f
@@ -436,7 +437,7 @@ class Equations:
 
     def to_jax(self, name: str = "rhs", dtype: str = "float64", through: str = "xla", unroll: bool | None = None,
                specialize: Numbers | None = None) -> Callable[..., jax.Array]:
-        """A function of the equations as f(t, x, params=None, inputs=(), ud=()) for JAX: jit, vmap, grad, jacobian.
+        """A function of the equations as f(t, x, params=None, inputs=None, ud=()) for JAX: jit, vmap, grad, jacobian.
 
         dtype      "float64" (needs JAX's jax_enable_x64) or "float32"
         through    "xla": statements that XLA compiles; "c": the compiled C library, which XLA calls on a CPU
@@ -444,8 +445,8 @@ class Equations:
                    faster on the device
         specialize   parameters, by symbol or name, that become numbers
 
-        One state x (n_x,), params in order or by name; jax.vmap takes many. Derivatives are symdyn's own. The result is
-        NaN where a module raises. Raises MissingExtra without JAX, SymdynError for a function that the equations do not have,
+        One state x (n_x,), params and inputs in order or by name; jax.vmap takes many. Derivatives are symdyn's own. The result
+        is NaN where a module raises. Raises MissingExtra without JAX, SymdynError for a function that the equations do not have,
         ArgumentError for float64 while JAX computes in float32.
 
         >>> import jax                                                         # doctest: +SKIP

@@ -132,6 +132,21 @@ def test_a_state_without_a_result_gives_nan() -> None:
         assert np.isnan(f(0.0, [0.1, 0.0], {"l": 0.0})).all() and np.isfinite(f(0.0, [0.1, 0.0])).all()
 
 
+@pytest.mark.parametrize("through", THROUGH)
+def test_inputs_by_name(through: str) -> None:
+    """As module.rhs has it: what is left out has its initial value."""
+    system = sd.systems.two_link_arm()
+    system.initial["tau2"] = 0.4
+    equations = system.embedding()
+    module, f, x = equations.compile("c"), equations.to_jax("rhs", through=through), [0.1, 0.2, 0.3, 0.4]
+    for given in ([1.0, 2.0], {"tau2": 2.0, "tau1": 1.0}, {"tau1": 1.0}, {}, (), None):
+        np.testing.assert_allclose(f(0.0, x, {"m1": 3.0}, given), module.rhs(0.0, x, {"m1": 3.0}, given), rtol=1e-13)
+    slope = jax.grad(lambda tau: f(0.0, x, None, {"tau1": tau})[2])(1.0)
+    np.testing.assert_allclose(slope, module.jacobian(0.0, x, inputs={"tau1": 1.0}).inputs[2, 0], rtol=1e-13)
+    with pytest.raises(ValueError, match="there is no input tau3, there are tau1, tau2"):
+        f(0.0, x, None, {"tau3": 1.0})
+
+
 def test_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     equations, _ = made("pendulum")
     f = equations.to_jax("rhs")

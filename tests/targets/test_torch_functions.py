@@ -89,6 +89,16 @@ def test_nan_and_messages() -> None:
         f(0.0, [0.1, 0.0], {"length": 1.0})
 
 
+def test_inputs_by_name() -> None:
+    equations = sd.systems.two_link_arm().embedding()
+    module, f, x = equations.compile("c"), equations.to_torch("rhs"), [0.1, 0.2, 0.3, 0.4]
+    for given in ([1.0, 2.0], {"tau2": 2.0, "tau1": 1.0}, {"tau1": 1.0}, {}, (), None):
+        np.testing.assert_allclose(f(0.0, x, {"m1": 3.0}, given), module.rhs(0.0, x, {"m1": 3.0}, given), rtol=1e-13)
+    assert f(0.0, x, None, {"tau1": torch.linspace(0, 1, 5)}).shape == (5, 4)
+    with pytest.raises(ValueError, match="there is no input tau3, there are tau1, tau2"):
+        f(0.0, x, None, {"tau3": 1.0})
+
+
 def test_the_page() -> None:
     """The example of the documentation runs."""
     block = next(b for b in re.findall(r"```py\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL) if "import torch" in b)
