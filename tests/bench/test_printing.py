@@ -22,7 +22,8 @@ def test_table(capsys):
 def test_a_longer_form_counts_as_missed(monkeypatch, capsys):
     rows = list(printing.printed("pendulum"))
     assert not any(row.longer for row in rows)
-    wrong = dataclasses.replace(rows[0], operations=rows[0].operations + 1, others=(None, rows[0].operations))
+    wrong = dataclasses.replace(rows[0], operations=rows[0].operations + 1,
+                                others={"polynomial": None, "nested": rows[0].operations})
     monkeypatch.setattr(printing, "printed", lambda name: iter([wrong, dataclasses.replace(rows[1], seconds=0.6)]))
     assert printing.run(["pendulum"]) == 2
     assert "another form is shorter" in capsys.readouterr().out
@@ -53,13 +54,44 @@ def test_a_shorter_form_of_sympy_counts_as_missed(monkeypatch, capsys):
     monkeypatch.setattr(kane_forms, "operations", lambda name, quantity, method: counts[method])
     assert printing.run(["cart_pole"], "sympy") == 2
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].endswith("SymPy") and lines[1].endswith("4 simplify      another form is shorter")
+    assert lines[0].endswith("SymPy") and lines[1].endswith("4 simplify      SymPy's form is shorter")
     assert "simplify" not in lines[3]
     monkeypatch.setattr(kane_forms, "operations", lambda *_: None)
     assert printing.by_sympy("cart_pole", "M_tilde") == "-"
 
 
 def test_what_is_too_large_has_a_row():
-    row = printing.Row("spatial_chain", "k_tilde", None, (None, 9), 945, 0.1)
-    assert row.longer and str(row).split() == ["spatial_chain", "k_tilde", "-", "-", "9", "945", "0.10"]
-    assert not dataclasses.replace(row, others=(None, None)).longer
+    row = printing.Row("spatial_chain", "k_tilde", None, {"polynomial": None, "fourier": 9}, 945, 0.1)
+    assert row.longer and str(row).split() == ["spatial_chain", "k_tilde", "-", "-", "-", "9", "9", "fourier", "945", "-", "0.10"]
+    row = dataclasses.replace(row, others={"polynomial": None, "fourier": None})
+    assert not row.longer and not row.faults
+    assert str(row).split() == ["spatial_chain", "k_tilde", "-", "-", "-", "-", "-", "945", "-", "0.10"]
+
+
+@pytest.mark.parametrize(("changed", "fault"), [
+    ({}, []), ({"operations": 144}, ["above 143"]), ({"operations": None}, ["another form is shorter", "above 143"])])
+def test_operations_above_the_reference_count_as_missed(changed, fault):
+    row = dataclasses.replace(printing.Row("three_link_arm", "k_tilde", 143, {"nested": 200}, None, 0.1), **changed)
+    assert row.faults == fault and "143" in str(row).split()
+
+
+@pytest.mark.parametrize(("named", "fault"), [
+    (599, []), (600, ["with names not below 600"]), (None, ["with names not below 600"])])
+def test_intermediates_stay_below_their_bound(named, fault):
+    row = printing.Row("puma560", "M_tilde", 1998, {}, named, 0.1)
+    assert row.faults == fault and str(row).split()[-3:-1] == ["-" if named is None else str(named), "600"]
+
+
+def test_figures_of_the_references_are_of_the_catalogue():
+    names = sd.systems.names()
+    assert {name for name, _ in (*printing.FIRST_FORM, *printing.WITH_NAMES)} < set(names)
+    assert all(quantity in printing.QUANTITIES for _, quantity in (*printing.FIRST_FORM, *printing.WITH_NAMES))
+    assert {*printing.LONGER, *printing.NAMED_LIMIT} < set(names)
+
+
+def test_slow_intermediates_count_as_missed(monkeypatch, capsys):
+    monkeypatch.setitem(printing.NAMED_LIMIT, "pendulum", 0.5)
+    rows = [dataclasses.replace(row, named_seconds=0.2) for row in printing.printed("pendulum")]
+    monkeypatch.setattr(printing, "printed", lambda name: iter(rows))
+    assert printing.run(["pendulum"]) == 1
+    assert "0.60 s for M_tilde, k_tilde and F_tilde in named intermediates, above 0.5 s" in capsys.readouterr().out
