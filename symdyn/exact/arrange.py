@@ -32,8 +32,8 @@ Cost = tuple[int, int]
 # clearly best, where the grouping leaves more than CLEAR of them. Squares of sums are looked for up to BOTH terms.
 FACTORED, ALL, BOTH, CLEAR, HORNER, FEWER_HORNER = 120, 16, 40, 0.6, 600, 150
 # A grouping is clearly best if it leaves less than FEWER of the terms, and than BETTER of those that the next best one leaves,
-# and no letter has more than LONG operations: such letters are worth to be written seldom.
-FEWER, BETTER, LONG = 0.7, 0.92, 4
+# which are less than ALONE of all, and no letter has more than LONG operations: such letters are worth to be written seldom.
+FEWER, BETTER, ALONE, LONG = 0.7, 0.92, 0.8, 4
 _INTEGERS = {int}
 _UNIT: frozenset = frozenset({((), 1)})
 _KINDS = (("motion",), ("parameter",), ("position",))
@@ -248,7 +248,10 @@ class Arranger:
         """Gathered by letters of these kinds together, where that leaves clearly fewer terms than by those of one kind."""
         groups = self._groups(p, kinds)
         left = _left(groups)
-        if groups is None or left >= FEWER * len(p) or left >= BETTER * min([_left(self._groups(p, (kind,))) for kind in kinds]):
+        if groups is None or left >= FEWER * len(p):
+            return None
+        alone = min([_left(self._groups(p, (kind,))) for kind in kinds])
+        if alone >= ALONE * len(p) or left >= BETTER * alone:
             return None
         if any(self.letters[letter].operations > LONG for letter in {letter for m in p for letter, _ in m}):
             return None
