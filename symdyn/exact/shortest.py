@@ -123,6 +123,7 @@ class Writer:
         self.arranger = Arranger(_Lookup(self))
         self._written: dict[Any, sp.Expr] = {}
         self._factors_below: dict[int, tuple[int, Tree]] = {}
+        self._nested: Writer | None = None
         n = len(exact.bases)
         self.bases = [Basis(exact, tuple(tuple(int(i == k) for i in range(n)) for k in range(n)))]
         longest = max((value.num for value in exact.values), key=len, default=None)
@@ -209,6 +210,12 @@ class Writer:
             return derived(math.inf)[0]
         tree = self.tree(value)
         result = _turned_below(self.tree_expression(tree))
+        divided_by_sum = any(len(self.exact.ring.factors[k]) > 1 for k, _ in value.under)
+        if self.form == "shortest" and divided_by_sum and len(value.num) <= LONG:
+            # Which way of writing what it is divided by is the shorter one turns out once signs are taken into it.
+            if self._nested is None:
+                self._nested = Writer(self.exact, self.symbols, "nested")
+            result = min(result, self._nested.write(value), key=sp.count_ops)
         if derived is not None and operations <= LONGER * total(tree)[0]:
             other, count = derived(total(tree)[0])
             # The cost of a tree is nearly the count of SymPy, which takes long.
