@@ -86,7 +86,7 @@ class WithFunctions:
         """Whether values or derivatives at a state (n_x,) are others at other times."""
         rows = np.array(t, dtype=float), np.tile(x, (len(t), 1)), np.zeros((len(t), self.of.n_in))
         for function in self.functions:
-            found = cost_of(self.module, self.what, function, self._names, self.p)(*rows)
+            found = cost_of(self.module, self.what, function, self._names, self.p, compared=False)(*rows)
             if np.ptp(np.column_stack([found.values, found.by_x]), axis=0).any():
                 return True
         return False
@@ -131,8 +131,8 @@ class WithFunctions:
         p = self.p.copy()
         p[list(self.of.free)] = row[self._by[self.of.n_x:]]
         try:
-            found = cost_of(self.module, self.what, function, self._names, p)(row[-1:], row[None, self._x],
-                                                                              np.zeros((1, self.of.n_in)))
+            cost = cost_of(self.module, self.what, function, self._names, p, compared=False)
+            found = cost(row[-1:], row[None, self._x], np.zeros((1, self.of.n_in)))
         except EvaluationError as error:
             if isinstance(error, InputRaised) and not isinstance(error.__cause__, OF_NUMBERS):
                 raise
