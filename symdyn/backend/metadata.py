@@ -202,7 +202,8 @@ class ModuleMetadata(Metadata):
     events, event_leaves   see EventRecord; entries of [t; x; inputs] whose ranges bound events
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
-    connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line")
+    connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line",
+                           "rope")
     acting                 forces and torques of loads, row by row of applied_loads: name, body, kind ("force", "torque")
     down                   direction of gravity, zero where there is none
     output_units           of outputs that are points

@@ -86,7 +86,7 @@ class Equations:
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
     down         direction of gravity, zero where there is none
-    connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force, line)
+    connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force, line, rope)
     acting       forces and torques of loads on bodies, in the order of the quantity applied_loads: name, body, kind
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches

@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 from symdyn.pictures.looks import Item, Mechanism, looks_of
 from symdyn.pictures.mechanism import Hung, Posed
 from symdyn.pictures.meshes import Part, box, line, sweep
+from symdyn.pictures.ropes import POINTS, rope
 
 # Bands of a ball, and the turns of a coil with their points.
 _BANDS = 8
@@ -42,6 +43,8 @@ class Form:
         """The vertices, n-frame, (n, 3)."""
         item, own = self.item, self.part.vertices
         a = posed.at(item.ends[0])
+        if item.kind == "rope":
+            return rope(a, posed.at(item.ends[1]), item.size[1], up)
         if item.kind == "ball":
             return np.asarray(a + item.size[0] * own)
         if item.kind in ("block", "box"):
@@ -121,6 +124,8 @@ def _forms(item: Item) -> list[Form]:
         return [Form(rod, item, radii=(size[0], size[1]))]
     if item.kind in ("thread", "line"):
         return [Form(line(body, color, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), _THREAD), item)]
+    if item.kind == "rope":
+        return [Form(line(body, color, np.zeros((POINTS, 3)), _THREAD), item)]
     found = []
     if item.kind in ("spring", "both"):
         found.append(Form(_coil(body, color), item, radii=(size[0], size[0])))

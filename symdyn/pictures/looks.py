@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.shown import shown
+
 GROUND = -1
 # Colours that readers with any kind of colour vision can tell apart: Okabe and Ito, Color Universal Design, 2008.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
@@ -44,6 +46,7 @@ class Mechanism:
     tips          further points that bodies reach to: body, (3,) in its axes
     travels       how far joints slide along their axes in a motion: least and most, m; () where it is not known
     corners       points that contacts have on bodies: body, (3,) in its axes; wheels: radii of bodies that touch with a rim, m
+    ropes         lengths of ropes, m, by the names of their connections
     """
 
     bodies: Sequence[str]
@@ -62,6 +65,7 @@ class Mechanism:
     travels: Sequence[tuple[float, float]] = ()
     corners: Sequence[tuple[int, np.ndarray]] = ()
     wheels: Mapping[int, float] = field(default_factory=dict)
+    ropes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def points(self) -> np.ndarray:
@@ -146,7 +150,7 @@ class Item:
     """A solid: its kind, what it hangs on, its sizes in m, its colour, what it is called.
 
     kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc; line: of a mooring, whose second
-            size is how much of it a still shows
+            size is how much of it a still shows; rope: whose second size is its length, over which it sags
     axis    index of the joint's axis; turn: (9,), own axes in body axes, of boxes and ellipsoids, row by row
     layer   "" for what is always shown, else what shows it: "inertia", "centres"
     """
@@ -186,6 +190,17 @@ def _length(m: Mechanism) -> float:
     return found if np.isfinite(found) and found > 0 else 1.0
 
 
+def ropes_of(names: Sequence[str], connections: Sequence[tuple[str, str, str, str]], gaps: Sequence[float],
+             springs: np.ndarray) -> dict[str, float]:
+    """Lengths of ropes, m, by the names of their connections: what is between the ends, and what is left.
+
+    names   of the contacts; gaps: one of each, m; springs: ends of the connections, (n_s, 6)
+    """
+    left = {f"rope {shown(name)}": float(gap) for name, gap in zip(names, gaps, strict=True)}
+    return {name: left[name] + float(np.linalg.norm(ends[3:] - ends[:3]))
+            for (name, *_, kind), ends in zip(connections, springs, strict=True) if kind == "rope"}
+
+
 def color_of_body(body: int) -> str:
     """Of its index, or of the ground."""
     return METAL if body == GROUND else PALETTE[body % len(PALETTE)]
@@ -221,6 +236,9 @@ def _springs(m: Mechanism, r: float, length: float) -> Iterator[Item]:
     first = 2 * len(m.joints) + 2 * len(m.bodies)
     for k, (name, _, _, kind) in enumerate(m.connections):
         ends = (first + 2 * k, first + 2 * k + 1)
+        if kind == "rope":
+            yield Item("rope", ends, (0.3 * r, m.ropes.get(name, 0.0)), STEEL, name)
+            continue
         size = (0.3 * r,) if kind == "force" else (0.2 * r, _LINE * length) if kind == "line" else (1.3 * r,)
         yield Item("thread" if kind == "force" else kind, ends, size, STEEL,
                    f"{name} ({'spring and damper' if kind == 'both' else 'mooring line' if kind == 'line' else kind})")

@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.jointed import carriers
-from symdyn.pictures.looks import GROUND, Mechanism, Ref
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, ropes_of
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
@@ -104,7 +104,9 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
                       at("joint_axes", 3) if len(points) else at("", 3), about.connections if len(springs) else (), springs,
                       inertia if len(inertia) == len(start) else None, about.planar, about.down, frozenset(drawn), tips)
     corners, wheels = _touching(solution, found, frames)
-    return replace(found, travels=_travels(found, frames), corners=corners, wheels=wheels)
+    gaps = at("contact_gaps", 1).ravel()[:4 * len(about.contacts):4].tolist()
+    ropes = ropes_of([c.name for c in about.contacts], found.connections, gaps, springs) if len(gaps) else {}
+    return replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels)
 
 
 def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:

@@ -16,7 +16,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.jointed import carriers
-from symdyn.pictures.looks import Mechanism
+from symdyn.pictures.looks import Mechanism, ropes_of
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
@@ -87,7 +87,7 @@ def _groups(equations: Equations) -> list[list[int]]:
 
 def _evaluate(equations: Equations, names: Sequence[str], values: dict[str, float]) -> dict[str, np.ndarray]:
     """Quantities at one configuration. Raises ArgumentError where a point is not finite."""
-    more = [n for n in ("drawn_lengths", "inertial_parameters") if n in equations.quantities]
+    more = [n for n in ("drawn_lengths", "inertial_parameters", "contact_gaps") if n in equations.quantities]
     found = {n: rows[0] for n, rows in evaluate_rows(equations.tape(*names, *more), values, 1).items()}
     wrong = [n for n in (*names, "drawn_lengths") if n in found and not np.isfinite(found[n]).all()]
     if wrong:
@@ -103,12 +103,14 @@ def _mechanism(equations: Equations, numbers: dict[str, np.ndarray]) -> Mechanis
     drawn |= {equations.bodies.index(r[end]) for r in equations.flexible for end in ("body", "tip") if r[end] in equations.bodies}
     drawn |= carriers(equations.bodies, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
     inertia = numbers.get("inertial_parameters")
+    springs = numbers.get("spring_points", nothing).reshape(-1, 6)
+    gaps = numbers.get("contact_gaps", nothing).ravel()[:4 * len(equations.contacts):4].tolist()
+    ropes = ropes_of([c.name for c in equations.contacts], equations.connections, gaps, springs) if len(gaps) else {}
     return Mechanism(equations.bodies, numbers["frames"].reshape(n_b, 12), numbers["positions"].reshape(n_b, 3),
                      equations.joints, numbers.get("joint_points", nothing).reshape(-1, 6),
                      numbers.get("joint_axes", nothing).reshape(-1, 3), equations.connections,
-                     numbers.get("spring_points", nothing).reshape(-1, 6),
-                     None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
-                     frozenset(drawn))
+                     springs, None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
+                     frozenset(drawn), ropes=ropes)
 
 
 def _functions(equations: Equations, names: Sequence[str]) -> str:

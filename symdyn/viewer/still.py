@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 
 from symdyn.pictures.looks import GROUND, PALETTE, Item, Mechanism, looks_of
 from symdyn.pictures.meshes import parts_of
+from symdyn.pictures.ropes import rope
 from symdyn.pictures.solids import color_of, filled
 
 _WIDE, _HIGH, _MARGIN = 260, 200, 12
@@ -82,6 +83,8 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
         yield from _hull(np.concatenate([base + size[0] * ring, ends[0] + size[0] / 4 * ring]), axes, item.color)
     elif len(ends) == 2 and kind != "line":
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
+        if kind == "rope":
+            ends = list(rope(ends[0], ends[1], size[1], np.array(m.up)))
         if kind in ("spring", "damper", "both"):
             ends = list(_zigzag(ends[0], ends[1], size[0], axes))
         points = np.array(ends)

@@ -229,7 +229,10 @@ class Stage {
             this.rod(scene, add(a, down, s[1]), a, [s[0], 0.25 * s[0]], color, name);
         } else {
             const b = source.at(item.ends[1]);
-            if (kind === "rod") this.rod(scene, a, b, s, color, name);
+            if (kind === "rope") {
+                const r = Math.max(s[0], 0.0012 * size(minus(this.eye[0], a))), points = ropeOf(a, b, s[1], this.up);
+                for (let k = 1; k < points.length; k++) this.rod(scene, points[k - 1], points[k], [r, r], color, name);
+            } else if (kind === "rod") this.rod(scene, a, b, s, color, name);
             else if (kind === "thread" || kind === "line") {
                 const [eye] = this.eye, r = Math.max(s[0], 0.0012 * size(minus(eye, a)));
                 this.rod(scene, a, b, [r, r], color, name);

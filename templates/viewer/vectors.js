@@ -45,3 +45,21 @@ function solve(A, b) {
     }
     return b;
 }
+
+// Points along a rope from a to b, evenly by its length: straight while it is taut, else a catenary against `up`.
+function ropeOf(a, b, length, up) {
+    const way = minus(b, a), v = inner(way, up), level = add(way, up, -v), h = size(level), count = 24;
+    if (size(way) >= length * (1 - 1e-5)) return [a, b];
+    const at = (share, height) => add(add(a, level, share), up, height), shares = Array.from({ length: count + 1 }, (_, k) => k / count);
+    const low = (length - v) / 2;
+    if (h < 1e-6 * length) return shares.map(s => at(s, s * length < low ? -s * length : s * length - 2 * low));
+    // sinh(w) / w = ratio: by Newton, of a convex function.
+    const ratio = Math.sqrt(length * length - v * v) / h;
+    let w = ratio < 3 ? Math.sqrt(6 * (ratio - 1)) : Math.log(2 * ratio) + Math.log(Math.log(2 * ratio));
+    for (let k = 0; k < 60; k++) w -= (Math.sinh(w) - ratio * w) / (Math.cosh(w) - ratio);
+    const c = h / (2 * w), lowest = h / 2 - c * Math.atanh(v / length);
+    return shares.map(s => {
+        const x = lowest + c * Math.asinh((s * length + c * Math.sinh(-lowest / c)) / c);
+        return at(x / h, c * (Math.cosh((x - lowest) / c) - Math.cosh(lowest / c)));
+    });
+}

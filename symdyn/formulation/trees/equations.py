@@ -99,9 +99,11 @@ def _joints(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]
 
 def _connections(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]:
     """Name, bodies and kind of the loads along a line."""
+    ropes = {f"rope {shown(contact.name)}" for contact in quantities.model.contacts if not contact.at}
+
     def kind(load: SpringDamper | ForceBetween) -> str:
         if isinstance(load, ForceBetween):
-            return "force"
+            return "rope" if load.label in ropes else "force"
         return "damper" if load.stiffness == 0 else "spring" if load.damping == 0 else "both"
 
     return tuple((load.label, name_of(load.body), "ground", "line") if isinstance(load, MooringLine) else
