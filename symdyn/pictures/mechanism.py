@@ -110,13 +110,20 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
 
 
 def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:
-    """Points of contacts that stay where they are on a body, and distances that they keep from the centre of mass of one; of
-    several bodies the one that is nearest."""
     if POINTS not in solution.module.functions:
         return [], {}
     some = np.unique(np.linspace(0, len(frames) - 1, _SAMPLES).astype(int))
     at = solution.rows(POINTS).reshape(len(frames), -1, 2, 3)[some][:, :, 0]
-    origins, rotations = frames[some, :, :3], frames[some][..., 3:].reshape(len(some), len(m.bodies), 3, 3)
+    return touched(m, frames[some], at)
+
+
+def touched(m: Mechanism, frames: np.ndarray, at: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:
+    """Points of contacts that stay where they are on a body, and distances that they keep from the centre of mass of one; of
+    several bodies the one that is nearest.
+
+    frames   of the bodies at some configurations, (n, n_b, 12), and where contacts are there, (n, n_c, 3), n-frame
+    """
+    origins, rotations = frames[..., :3], frames[..., 3:].reshape(len(frames), len(m.bodies), 3, 3)
     own = np.array([m.centre(body) for body in range(len(m.bodies))])
     centres = origins + np.einsum("tbij,bj->tbi", rotations, own)
     near = _SAME * float(np.ptp(np.concatenate([centres.reshape(-1, 3), at.reshape(-1, 3)]), axis=0).max(initial=0.0))

@@ -14,9 +14,11 @@ from symdyn.emission import emit
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
+from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.jointed import carriers
 from symdyn.pictures.looks import Mechanism, ropes_of
+from symdyn.pictures.mechanism import touched
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from symdyn.model.record import Model
     from symdyn.model.system import System
 
+# Configurations at which is looked where contacts are.
+_SAMPLES = 6
 # What the page evaluates to place what is drawn, and to close loops.
 _POSES = ("frames", "positions", "joint_points", "joint_axes", "spring_points")
 _CLOSURE = ("C", "C_r", "N")
@@ -39,7 +43,7 @@ def show(system: System, path: Any = None, params: Numbers | None = None, q: Val
     closes = any(equations.holonomic)
     values, missing = _values(equations, params, q)
     numbers = _evaluate(equations, names, values)
-    mechanism = _mechanism(equations, numbers)
+    mechanism = _mechanism(equations, numbers, values)
     lengths = numbers.get("drawn_lengths", np.zeros(0)).ravel()
     bent = bent_bodies(equations.flexible, equations.bodies, lambda name: np.array([values[name]]))
     data = scene_of(mechanism, equations.drawn, lengths, bent, model.name)
@@ -54,7 +58,7 @@ def mechanism_of(model: Model) -> tuple[Mechanism, np.ndarray]:
     equations = embed(replace(model, loops=(), constraints=()))
     values, _ = _values(equations, None, None)
     numbers = _evaluate(equations, [n for n in _POSES if n in equations.quantities], values)
-    return _mechanism(equations, numbers), numbers.get("drawn_lengths", np.zeros(0)).ravel()
+    return _mechanism(equations, numbers, values), numbers.get("drawn_lengths", np.zeros(0)).ravel()
 
 
 def _values(equations: Equations, params: Any, q: Any) -> tuple[dict[str, float], list[str]]:
@@ -96,7 +100,7 @@ def _evaluate(equations: Equations, names: Sequence[str], values: dict[str, floa
     return found
 
 
-def _mechanism(equations: Equations, numbers: dict[str, np.ndarray]) -> Mechanism:
+def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dict[str, float]) -> Mechanism:
     n_b = len(equations.bodies)
     nothing = np.zeros((0, 6))
     drawn = {equations.bodies.index(r["body"]) for r in equations.drawn if r.get("body") in equations.bodies}
@@ -106,11 +110,35 @@ def _mechanism(equations: Equations, numbers: dict[str, np.ndarray]) -> Mechanis
     springs = numbers.get("spring_points", nothing).reshape(-1, 6)
     gaps = numbers.get("contact_gaps", nothing).ravel()[:4 * len(equations.contacts):4].tolist()
     ropes = ropes_of([c.name for c in equations.contacts], equations.connections, gaps, springs) if len(gaps) else {}
-    return Mechanism(equations.bodies, numbers["frames"].reshape(n_b, 12), numbers["positions"].reshape(n_b, 3),
+    found = Mechanism(equations.bodies, numbers["frames"].reshape(n_b, 12), numbers["positions"].reshape(n_b, 3),
                      equations.joints, numbers.get("joint_points", nothing).reshape(-1, 6),
                      numbers.get("joint_axes", nothing).reshape(-1, 3), equations.connections,
                      springs, None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
                      frozenset(drawn), ropes=ropes)
+    corners, wheels = _touching(equations, found, values)
+    return replace(found, corners=corners, wheels=wheels)
+
+
+def _touching(equations: Equations, m: Mechanism,
+              values: dict[str, float]) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:
+    """Corners and rims, see `touched`: from some configurations, whether they are closed or not."""
+    if POINTS not in equations.quantities:
+        return [], {}
+    rng = np.random.default_rng(0)
+    rows: dict[str, Any] = dict(values)
+    names = [c.name for c in equations.symbols.coordinates]
+    for name in names:
+        rows[name] = values[name] + rng.uniform(-1, 1, _SAMPLES)
+    for group in _groups(equations):
+        norm = np.sqrt(sum(rows[names[k]] ** 2 for k in group))
+        for k in group:
+            rows[names[k]] = rows[names[k]] / norm
+    with np.errstate(all="ignore"):
+        found = evaluate_rows(equations.tape("frames", POINTS), rows, _SAMPLES)
+    at = found[POINTS].reshape(_SAMPLES, -1, 2, 3)[:, :, 0]
+    frames = found["frames"].reshape(_SAMPLES, len(m.bodies), 12)
+    there = np.isfinite(frames).all(axis=(1, 2)) & np.isfinite(at).all(axis=(1, 2))
+    return touched(m, frames[there], at[there]) if there.sum() > 1 else ([], {})
 
 
 def _functions(equations: Equations, names: Sequence[str]) -> str:

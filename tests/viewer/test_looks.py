@@ -120,3 +120,21 @@ def test_bodies_without_mass_that_only_slide_are_no_rails() -> None:
     assert mechanism.carriers == {0}
     items = [item for item in looks_of(mechanism)[0] if not item.layer]
     assert sorted(item.kind for item in items) == ["ball", "ball", "pin", "rod"]
+
+
+def test_what_touches_is_as_large_as_its_contacts() -> None:
+    """A box to its corners, a wheel to its rim, before anything moves."""
+    system = sd.System("blocks", gravity=[0, 0, -9.81])
+    box = system.add_body("box", mass=2, inertia=[0.1, 0.2, 0.3])
+    wheel = system.add_body("wheel", mass=1, inertia=[0.01, 0.02, 0.01])
+    system.add_joint(sd.Free("of_box", system.ground, box, orientation=sd.EulerParameters()))
+    system.add_joint(sd.Free("of_wheel", system.ground, wheel))
+    system.add_contact(sd.Contact("corners", box, system.ground, shape=sd.contacts.Box([0.4, 0.6, 0.2]), friction=0.3))
+    system.add_contact(sd.Contact("rim", wheel, system.ground, shape=sd.contacts.Disc(0.35, axis=[0, 1, 0]), friction=0.3))
+    items, mechanism, _ = looks(system)
+    (block,) = [item for item in items if item.kind == "box"]
+    np.testing.assert_allclose(block.size, [0.2, 0.3, 0.1])
+    (disc,) = [item for item in items if item.name == "wheel"]
+    np.testing.assert_allclose(disc.size, 0.35)
+    axle = np.subtract(mechanism.at(disc.ends[1]), mechanism.at(disc.ends[0]))
+    np.testing.assert_allclose(np.abs(axle / np.linalg.norm(axle)), [0, 1, 0], atol=1e-12)
