@@ -76,7 +76,9 @@ class _Parser:
             found = _TOKEN.match(self.text, at)
             if found is None:
                 at += len(self.text[at:]) - len(self.text[at:].lstrip())
-                raise Wrong(f"is {shown(self.text, 80)}; {self.text[at]!r} at character {at + 1} is no part of an expression")
+                hint = "; names stand in double quotation marks, the expression then in single ones"
+                raise Wrong(f"is {shown(self.text, 80)}; {self.text[at]!r} at character {at + 1} is no part of an expression"
+                            + (hint if self.text[at] == "'" else ""))
             kind = found.lastgroup or ""
             tokens.append((kind, found[kind], found.start(kind)))
             at = found.end()

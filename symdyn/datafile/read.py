@@ -99,7 +99,8 @@ class _Reader:
             if key not in KEYS:
                 v.fault((key,), f"is no entry of a data file{near(key, list(KEYS))}")
         if content.get("format") != FORMAT:
-            v.fault(("format",), f"is {shown(content.get('format'))}; this version reads format = {FORMAT}")
+            found = f"is {shown(content['format'])}" if "format" in content else "is missing"
+            v.fault(("format",), f"{found}; this version reads format = {FORMAT}")
         numbers = self._declare()
         v.bodies |= self._names("bodies")
         v.joints |= self._names("joints")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from collections.abc import Callable, Mapping
 from fractions import Fraction
@@ -56,11 +57,18 @@ def constant(value: Any) -> float:
     if not isinstance(value, Node):
         return double(value)
     digits = Digits(40)
-    found = walk(reachable([value]), digits)[value]
+    try:
+        found = walk(reachable([value]), digits)[value]
+    except OverflowError:  # of mpmath, for exp(exp(exp(exp(9)))), whose exponent has too many digits itself
+        found = digits.context.inf
     if isinstance(found, digits.context.mpc):
         raise UnsupportedExpression(f"a constant of the equations is the complex number {digits.context.nstr(found, 6)}; "
                                     "look for the root, logarithm or arc function of a number outside its range")
-    return float(found)
+    result = float(found)
+    if math.isinf(result):
+        raise UnsupportedExpression("a constant of the equations is beyond the range of double precision, 1.8e308; look for an "
+                                    "exponential or a power of numbers that large")
+    return result
 
 
 class Digits(Arithmetic):

@@ -16,6 +16,7 @@ from symdyn.cli import main
 from symdyn.datafile.expressions import FUNCTIONS, Wrong, parsed
 from symdyn.datafile.lines import lines_of
 from symdyn.datafile.texts import number_or_text
+from symdyn.errors import UnsupportedExpression
 from symdyn.pipeline import emit
 
 
@@ -121,6 +122,7 @@ def test_expressions_are_read_back_equal(e: sp.Expr) -> None:
 
 @pytest.mark.parametrize(("text", "message"), [
     ("__import__('os')", "is no part of an expression"),
+    ("position('bob', [0, 0])[0]", "names stand in double quotation marks, the expression then in single ones"),
     ("a.__class__", "found '__class__' at character 3, expected dot or ddot"),
     ("eval(a)", "there is no function eval"), ("sun(a)", "there is no function sun; did you mean"), ("a +", "found the end"),
     ("aa", "aa is not declared; did you mean a?"), ("10**10**10", "too many digits"), ("1/0", "divides by zero"),
@@ -143,7 +145,7 @@ BALL = JOINT.replace("Revolute", "Spherical")
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ('name = "m"\n', "text:1: format is None; this version reads format = 1"),
+    ('name = "m"\n', "text:1: format is missing; this version reads format = 1"),
     (HEAD + "gravty = 1", "text:3: gravty is no entry of a data file; did you mean gravity?"),
     (HEAD + "gravity = 3", "text:3: gravity is 3; write a list in brackets"),
     (HEAD + "planar = 1", "text:3: planar is 1; write true or false"),
@@ -263,3 +265,16 @@ def test_another_process_reads_the_same(tmp_path: Path) -> None:
     program = "import symdyn, sys; sys.stdout.write(symdyn.read_system(sys.argv[1]).to_toml())"
     found = subprocess.run([sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True, timeout=120)
     assert found.stdout == text
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("exp(exp(exp(exp(1000))))", "a constant of the equations is beyond the range of double precision"),
+    ("exp(1000)*x", "a constant of the equations is beyond the range of double precision"),
+    ("asin(2)*x", "a constant of the equations is the complex number")])
+def test_constants_that_are_no_doubles(text: str, message: str) -> None:
+    """They are read, and rejected where numbers are made of them, not taken as infinite."""
+    system = sd.systems.pendulum()
+    written = system.to_toml().replace("[[bodies]]", "[inputs]\nx = {}\n\n[[bodies]]", 1)
+    model = sd.read_system(written + f'\n[[outputs]]\nname = "large"\nvalue = "{text}"\n')
+    with pytest.raises(UnsupportedExpression, match=message):
+        model.embedding().compile("numpy").outputs(0.0, [0.1, 0.0])

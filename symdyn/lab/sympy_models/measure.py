@@ -4,7 +4,8 @@
 
 Each row has the example, SymPy's time to derive it, the operations of what it prints, the time in which symdyn takes it over, its
 operations, one evaluation of x_dot by symdyn's C module and by `sympy.lambdify(..., cse=True)` with numpy.linalg.solve, and the
-largest difference of both relative to x_dot at random states, also of the derivatives by x unless SymPy takes minutes for them.
+largest difference of both relative to x_dot at random states, also of the derivatives by x, unless SymPy takes long for
+them, half a minute and more.
 The bicycle is compared with published eigenvalues. Exit code 1: a difference above BOUND.
 """
 
