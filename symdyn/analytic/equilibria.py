@@ -19,6 +19,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
+from flint import fmpq, fmpq_mpoly_ctx
 
 from symdyn.analytic.linear import State
 from symdyn.errors import ArgumentError, SymdynError
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 
 # Cases that are followed; a mechanism of n links has 2^n positions of rest.
 CASES = 4096
+# Digits of numbers that tell whether equations are fulfilled.
+DIGITS = 30
 # Numbers of 30 digits below this are zero; those of expressions at numbers for parameters, which may cancel.
 ZERO, NEAR = 1e-20, 1e-12
 # Numbers for parameters that are tried until one meets the conditions.
@@ -494,6 +497,9 @@ class _Search:
         if any(e.atoms(sp.Symbol) - set(names) for e in case.left):
             raise SymdynError(f"{problem}; pass numbers for all parameters with values=..., fix some coordinates, or use "
                               "module.equilibria()")
+        found = self._by_resultants(case)
+        if found is not None:
+            return found
         circles = [s**2 + c**2 - 1 for s, c in self.pairs.values() if s in names or c in names]
         basis = sp.groebner([*case.left, *circles], *names, order="lex")
         if basis.exprs == [1]:
@@ -502,6 +508,74 @@ class _Search:
         if not any(len(self._unknowns(e)) == 1 for e in polynomials) or set(polynomials) == set(case.left):
             raise SymdynError(f"{problem}: they do not hold at single states; fix some coordinates, or use module.equilibria()")
         return [_Case(tuple(polynomials), case.found, case.angles, case.conditions)]
+
+    def _by_resultants(self, case: _Case) -> list[_Case] | None:
+        """Two angles from a loop's closure, linear in sine and cosine of one of them, and from what remains of the balance of
+        forces once multipliers are eliminated: a polynomial in the cosine of the other. None where it is not so."""
+        pairs = [k for k, pair in self.pairs.items() if any(e.free_symbols & set(pair) for e in case.left)]
+        multipliers = [x for x in self.multipliers if any(e.has(x) for e in case.left)]
+        loaded = [e for e in case.left if e.free_symbols & set(multipliers)]
+        letters = {s for k in pairs for s in self.pairs[k]}
+        if len(pairs) != 2 or len(case.left) - len(loaded) != 1 or len(loaded) != len(multipliers) + 1 \
+                or any(e.free_symbols - letters - set(multipliers) for e in case.left):
+            return None
+        closure, = [e for e in case.left if e not in loaded]
+        try:
+            matrix, right = sp.linear_eq_to_matrix(loaded, multipliers)
+        except sp.NonlinearError:
+            return None
+        balance = sp.expand(matrix.row_join(right).det(method="berkowitz"))
+        for first, second in (pairs, pairs[::-1]):
+            linear = sp.Poly(closure, *self.pairs[second])
+            if linear.total_degree() == 1:
+                cosines = _cosines(closure, balance, *self.pairs[second], *self.pairs[first])
+                if cosines is not None:
+                    points = self._turns(linear, balance, self.pairs[first], cosines)
+                    return None if points is None else self._balanced(case, first, second, points, matrix, right)
+        return None
+
+    def _turns(self, linear: sp.Poly, balance: sp.Expr, first: tuple[sp.Symbol, sp.Symbol], cosines: Sequence[sp.Expr],
+               ) -> list[dict[sp.Symbol, sp.Expr]] | None:
+        """Sines and cosines that close the loop and balance it; None where the loop leaves an angle open."""
+        s, c = linear.gens
+        found = []
+        for x in cosines:
+            for y in dict.fromkeys([sp.sqrt(1 - x**2), -sp.sqrt(1 - x**2)]):
+                a, b, d = (linear.coeff_monomial(k).subs(dict(zip(first, (y, x), strict=True))) for k in (s, c, 1))
+                size = a**2 + b**2
+                inside = size - d**2
+                if _small(size):
+                    if _small(d):
+                        return None
+                    continue
+                if _small(inside):
+                    inside = sp.S.Zero
+                elif _digits(inside) < 0:
+                    continue
+                for w in dict.fromkeys([sp.sqrt(inside), -sp.sqrt(inside)]):
+                    point = {**dict(zip(first, (y, x), strict=True)), s: (b * w - a * d) / size, c: (-a * w - b * d) / size}
+                    if _small(balance.subs({letter: _digits(e) for letter, e in point.items()})):
+                        found.append(point)
+        return found
+
+    def _balanced(self, case: _Case, first: int, second: int, points: Sequence[dict[sp.Symbol, sp.Expr]], matrix: sp.Matrix,
+                  right: sp.Matrix) -> list[_Case] | None:
+        """Cases with multipliers; None where a point leaves one open."""
+        cases = []
+        multipliers = [x for x in self.multipliers if any(e.has(x) for e in case.left)]
+        for point in points:
+            values = dict(point)
+            if multipliers:
+                minors = {rows: _minor(matrix, rows, point) for rows in combinations(range(matrix.rows), matrix.cols)}
+                rows, below = max(minors.items(), key=lambda item: abs(_digits(item[1])))
+                if _small(below):
+                    return None
+                forces = matrix.extract(list(rows), list(range(matrix.cols))).subs(point).adjugate() \
+                    * right.extract(list(rows), [0]).subs(point) / below
+                values |= dict(zip(multipliers, forces, strict=True))
+            angles = {k: sp.atan2(*[point[x] for x in self.pairs[k]]) for k in (first, second)}
+            cases.append(replace(case.put(values, angles), left=()))
+        return cases
 
     def _angle(self, unknown: Any) -> sp.Expr:
         if isinstance(unknown, sp.Symbol):
@@ -521,6 +595,12 @@ class _Search:
         if any(c == False for c in case.conditions):  # noqa: E712
             return None
         ordered = {x: values[x] for x in self.unknown if x in values}
+        if any(e.has(sp.CRootOf) for e in ordered.values()) and not any(e.free_symbols for e in ordered.values()):
+            # Roots of polynomials of high degree take minutes within functions; nothing is proved of them anyway.
+            numbers = {x: _digits(e) for x, e in ordered.items()}
+            if not all(_small(e.subs(numbers)) for e in self.entries):
+                return None
+            return EquilibriumPoint(ordered, tuple(free), tuple(dict.fromkeys(case.conditions)), False)
         residuals = [e.subs(ordered) for e in self.entries]
         proved = all(e == 0 or _proved(e) for e in residuals)
         if not proved and any(not e.free_symbols and not _vanishes(e) for e in residuals):
@@ -536,16 +616,20 @@ class _Search:
         """Coordinates within angles, from base angles; and sines and cosines of base angles that may have any value. These leave
         as many coordinates free, the first ones that determine them, in which the others are written."""
         loose = {k: sp.Dummy(f"angle{k}", real=True) for k in self.pairs if k not in angles}
+        # Letters for roots of polynomials of high degree, with which SymPy takes long for sums.
+        roots = {k: sp.Dummy(f"root{k}", real=True) for k, angle in angles.items() if angle.has(sp.CRootOf)}
+        back = {letter: angles[k] for k, letter in roots.items()}
         rows, right = [], []
         for k in self.pairs:
             base = self.exact.bases[k]
             rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
             constant = sp.Add(*[_exact(f) * sp.Mul(*[self.writer.angles.node(n) for n in term]) for term, f in base.items()
                                 if not set(term) & self.unknown_leaves])
-            right.append({**angles, **loose}[k] - constant)
+            right.append({**angles, **loose, **roots}[k] - constant)
         found = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))
         if not loose:
-            return {q: _whole(value) for q, value in found.items()}, {}
+            return {q: _whole(value).xreplace(back) for q, value in found.items()}, {}
+        found = {q: value.xreplace(back) for q, value in found.items()}
         unknown, letters = list(loose.values()), {s for k in loose for s in self.pairs[k]}
         leading: list[sp.Symbol] = []
         for q, value in found.items():
@@ -562,6 +646,40 @@ class _Search:
         known = {letter: function(sp.expand(solved[d])) for k, d in loose.items()
                  for letter, function in zip(self.pairs[k], (sp.sin, sp.cos), strict=True)}
         return {q: _whole(sp.expand(value.subs(solved)).subs(known)) for q, value in found.items() if q not in leading}, known
+
+
+def _digits(e: sp.Expr) -> sp.Expr:
+    """The value of a number, with digits to spare: those of roots first, which takes a fraction of the time."""
+    return e.xreplace({root: root.evalf(3 * DIGITS) for root in e.atoms(sp.CRootOf)}).evalf(2 * DIGITS)
+
+
+def _small(e: sp.Expr) -> bool:
+    """Whether a number is zero but for rounding of what `_digits` gives."""
+    return bool(abs(_digits(e)) < ZERO)
+
+
+def _minor(matrix: sp.Matrix, rows: Sequence[int], values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """The determinant of some rows."""
+    return matrix.extract(list(rows), list(range(matrix.cols))).det(method="berkowitz").subs(values)
+
+
+def _cosines(one: sp.Expr, other: sp.Expr, s: sp.Symbol, c: sp.Symbol, sine: sp.Symbol, cosine: sp.Symbol,
+             ) -> list[sp.Expr] | None:
+    """All cosines at which two polynomials in sines and cosines of two angles may vanish, the first linear in s and c: the real
+    roots of a resultant of their resultants. None where that is zero."""
+    names = (s, c, sine, cosine)
+    context = fmpq_mpoly_ctx.get(tuple(map(str, range(4))), "lex")
+    a, b = (context.from_dict({m: fmpq(int(n.p), int(n.q)) for m, n in sp.Poly(e, *names).terms()}) for e in (one, other))
+    turns = [context.gens()[k] ** 2 + context.gens()[k + 1] ** 2 - 1 for k in (0, 2)]
+    without = [divmod(a.resultant(p, 0), turns[1])[1] for p in (turns[0], b)]
+    left = divmod(without[0].resultant(without[1], 1), turns[1])[1].resultant(turns[1], 2)
+    if len(left) == 0:
+        return None
+    roots: list[sp.Expr] = []
+    for factor, _ in left.factor()[1]:
+        p = sp.Poly.from_dict({(m[3],): sp.Rational(int(n.p), int(n.q)) for m, n in factor.terms()}, cosine)
+        roots += [root for root in p.real_roots() if -1 <= root.evalf(30) <= 1]
+    return roots
 
 
 def _decimal(value: Any) -> Any:
