@@ -26,7 +26,7 @@ MOTION = "the equation of motion of "
 # What a condition whose variables are all given may lack, of its size.
 GIVEN = 1e-7
 # How far from the guess, of the sizes of variables, the cost and conditions have their sizes, too: both may be flat at the guess.
-BESIDE = 0.1
+NEARBY = 0.1
 # Relative errors of integrals of the cost along polynomials, and along motions simulated back, whose states have errors.
 EXACT, SIMULATED = 1e-11, 1e-8
 
@@ -137,10 +137,10 @@ class Discretized:
             found[at.duration] = sizes.duration
         return unit(found)
 
-    def _beside(self, z_least: np.ndarray, z_most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The guess, and variables beside it."""
+    def _nearby(self, z_least: np.ndarray, z_most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The guess, and variables nearby."""
         n = self.layout.n
-        return self.z[:n], np.clip(self.z[:n] + BESIDE * self.z_sizes[:n], z_least[:n], z_most[:n])
+        return self.z[:n], np.clip(self.z[:n] + NEARBY * self.z_sizes[:n], z_least[:n], z_most[:n])
 
     def _sizes_of_rows(self, program: Program) -> np.ndarray:
         """What variables of their sizes change each row by, (m,): by its linear part; without one by its derivatives, the largest
@@ -148,7 +148,7 @@ class Discretized:
         linear = abs(program.L) @ sp.diags(self.z_sizes[:program.n])
         found = np.asarray(linear.max(axis=1).todense()).ravel() if program.L.nnz else np.zeros(program.m)
         curved = np.zeros(program.m)
-        for z in self._beside(program.z_least, program.z_most):
+        for z in self._nearby(program.z_least, program.z_most):
             J = np.nan_to_num(np.abs(program.jacobian(z)), nan=0.0, posinf=0.0) * self.z_sizes[program.jacobian_columns]
             np.maximum.at(curved, program.jacobian_rows, J)
         there = np.nan_to_num(np.abs(program.g(self.z)), nan=0.0, posinf=0.0)
@@ -161,13 +161,13 @@ class Discretized:
         return unit(found)
 
     def _size_of_cost(self) -> float:
-        """What variables of their sizes change the cost by, at the guess or beside it."""
+        """What variables of their sizes change the cost by, at the guess or nearby."""
         if self.elastic:
             return 1.0
         program = self.program
         moving = program.z_least < program.z_most
         slopes = [np.abs(program.gradient(z) * self.z_sizes)[moving].sum()
-                  for z in self._beside(program.z_least, program.z_most)]
+                  for z in self._nearby(program.z_least, program.z_most)]
         size = max((slope for slope in slopes if np.isfinite(slope)), default=0.0)
         return float(unit(np.array(size))) if size > 0 else 1.0
 

@@ -207,10 +207,11 @@ def test_what_loads_look_at_is_told() -> None:
 
 def test_curves_that_would_flatten_others_have_axes_of_their_own() -> None:
     t = np.linspace(0, 1, 5)[:, None]
-    panel = Panel("coordinates", "rad", ["a", "rotor", "b", "none"], t * [0.1, 70.0, 0.4, 0.0])
+    names = ["a", "rotor", "b", "none"]
+    panel = Panel("coordinates", "rad", names, t * [0.1, 70.0, 0.4, 0.0], names)
     assert [list(p.names) for p in embedded._apart(panel)] == [["a", "b", "none"], ["rotor"]]
-    assert embedded._apart(Panel("x", "m", ["a", "b"], t * [1.0, 9.0]))[0].names == ["a", "b"]
-    assert len(embedded._apart(Panel("energy", "J", ["a", "b"], t * [1.0, 900.0]))) == 1
+    assert embedded._apart(Panel("x", "m", ["a", "b"], t * [1.0, 9.0], ["a", "b"]))[0].names == ["a", "b"]
+    assert len(embedded._apart(Panel("energy", "J", ["a", "b"], t * [1.0, 900.0], ["a", "b"], "energy"))) == 1
 
 
 def test_files_that_cannot_be_written_are_refused(solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
