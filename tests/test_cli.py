@@ -522,7 +522,7 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["xyz"], "there is no command 'xyz'; there are list, schema, derive,"),
     (["export", "pendulum"], "nothing to export: pass one of --casadi, --jax, --torch"),
     (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, firmware, fortran, javascript"),
-    (["generate", "pendulum", "--functions", "lhs"], "no function lhs; it has rhs"),
+    (["generate", "pendulum", "--functions", "lhs"], "no function lhs; did you mean rhs? There are rhs"),
     (["generate", "pendulum", "--templates", "absent"], "template folder absent does not exist"),
     (["simulate", "pendulum", "--set", "mm=1"], "there is no 'mm', did you mean m?"),
     (["simulate", "pendulum", "--set", "m=heavy"], "--set m=heavy: 'heavy' is not a number"),

@@ -332,7 +332,7 @@ class System:
         >>> q, = system.initial
         >>> system.add_joint_force("pivot", -q.dot / 4)
         >>> system.embedding().F_tilde
-        Matrix([[-(g*l*m*sin(q1) + q1_dot/4)]])
+        Matrix([[-g*l*m*sin(q1) - q1_dot/4]])
         """
         label = self._label(name, f"joint_force_{len(self.loads) + 1}")
         self.loads.append(JointForce(joint, self._faults.expressions(value, label), label))
@@ -384,7 +384,7 @@ class System:
         >>> system = sd.systems.pendulum()
         >>> drag = system.add_load(sd.LinearDamping("bob", [0, 0, 0, 0, 0, 0.1]))
         >>> system.embedding().F_tilde
-        Matrix([[-(g*l*m*sin(q1) + 0.1*q1_dot)]])
+        Matrix([[-g*l*m*sin(q1) - 0.1*q1_dot]])
         """
         if not isinstance(load, (Element, AddedMass)):
             self._faults.append(f"add_load was given {shown(load)}; pass a load such as sd.Buoyancy(...) or "
