@@ -17,6 +17,7 @@ import numpy as np
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 from symdyn.estimation.experiment import Measured
 from symdyn.estimation.starts import Start
+from symdyn.runtime.integrating.simulate import simulate
 from symdyn.shown import name_of
 
 if TYPE_CHECKING:
@@ -187,8 +188,9 @@ class Problem:
             sizes = self.module.metadata.sizes
             given = dict(zip(("q", "u", "z"), np.split(x, [sizes.q, sizes.q + sizes.u]), strict=True))
             asked = {u.asked: start.derivative(x, p, u.state) for u, _ in mine}
-        return self.module.simulate(self.experiments[k].t, **given, params=params, inputs=experiment.inputs, rtol=self.rtol,
-                                    method=self.method, max_steps=self._most[k] if self._most else None, sensitivities=asked)
+        return simulate(self.module, self.experiments[k].t, **given, params=params, inputs=experiment.inputs, rtol=self.rtol,
+                        method=self.method, max_steps=self._most[k] if self._most else None, sensitivities=asked,
+                        judged=self.runs == 1)
 
     def _start(self, k: int, unknown: Mapping[str, float]) -> dict[str, Any]:
         """q, u and z of an experiment, with the unknown initial values put in."""

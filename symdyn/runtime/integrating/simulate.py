@@ -65,8 +65,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
              progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
              event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error", sensitivities: Any = None,
-             sensitivity_control: bool = True, step: float = 0.0) -> Solution:
-    """See Module.simulate."""
+             sensitivity_control: bool = True, step: float = 0.0, judged: bool = True) -> Solution:
+    """See Module.simulate; judged: whether sensitivities are looked at for what there is to be warned of in them, which takes as
+    long as a short run: fits have that of their first motion."""
     metadata = module.metadata
     p = real_parameters(module, params)
     start = start_of(module, q, u, z)
@@ -144,7 +145,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         free = free.recorded(outcome.record)
         known = replace(request, inputs=free)
-        of_columns = [] if outcome.interrupted else asked.doubts(
+        of_columns = [] if outcome.interrupted or not judged else asked.doubts(
             module, known, outcome, lambda: _steps(module, replace(whole, inputs=free), method, outcome.n_steps))
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen]), *of_columns))
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
