@@ -196,7 +196,8 @@ class _Outputs:
         known = output_names(module)
         self.names, self.n_y = [known[k] for k in places], len(known)
         given = (*module.metadata.inputs, *module.metadata.parameters)
-        self.by = [given.index(name) for name in by]
+        columns = {name: k for k, name in enumerate(given)}
+        self.by = [columns[name] for name in by]
 
     def values(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> dict[str, np.ndarray]:
         if not self.names:

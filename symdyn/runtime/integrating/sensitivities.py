@@ -265,14 +265,15 @@ def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
                       f"[{parameter}'{metadata.x[0]}(0)']")
         return {}
     found: dict[str, str] = {}
+    constant = {*metadata.parameters, *metadata.inputs}
     for one in given:
         name = name_of(one) if not isinstance(one, str) else one
-        initial = _INITIAL.fullmatch(name) if isinstance(name, str) else None
+        initial = _INITIAL.fullmatch(name) if isinstance(name, str) and name.endswith(")") else None
         if name in found:
             faults.append(f"sensitivities name {name} twice; leave one out")
         elif initial and initial["name"].strip() in metadata.x:
             found[name] = initial["name"].strip()
-        elif isinstance(name, str) and name in (*metadata.parameters, *metadata.inputs):
+        elif isinstance(name, str) and name in constant:
             found[name] = ""
         else:
             faults.append(_unknown(module, name))
