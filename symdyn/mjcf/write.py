@@ -121,8 +121,9 @@ class _Writer:
             self.u_start += [float(values[u]) for u in speeds]
             return
         for q, u in zip(symbols, speeds, strict=True):
-            rate = sum((sp.sympify(q).diff(s) * s.dot for s in symbols_of(q) if isinstance(s, Coordinate)), sp.S.Zero)
-            self.q_start.append(float(sp.sympify(q).xreplace(values)))
+            position = sp.sympify(q, strict=True)
+            rate = sum((position.diff(s) * s.dot for s in symbols_of(q) if isinstance(s, Coordinate)), sp.S.Zero)
+            self.q_start.append(float(position.xreplace(values)))
             self.u_start.append(float(rate.xreplace(values)))
             if u is not None and u != rate and values.get(u):
                 self.faults.append(f"joint {shown(joint.name)} starts with the speed {u}, which is not the rate of a coordinate; "
