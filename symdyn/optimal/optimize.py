@@ -135,8 +135,8 @@ def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tupl
         ipopt.casadi()
     if problem.jumps:
         warnings.warn(f"{module.name}: {'; '.join(problem.jumps)}. Solvers that go by derivatives do not see jumps, and end at a "
-                      "motion beside which others may cost less: make them smooth, or optimize once for each side, with the side "
-                      "as a condition of path, and compare the costs", OptimumWarning, stacklevel=2)
+                      "motion next to which others may cost less: make them smooth, or optimize once for each side, with the "
+                      "side as a condition of path, and compare the costs", OptimumWarning, stacklevel=2)
     on_states = bool(_on_states(problem))
     chosen = replace(chosen, kind=chosen.kind or ("radau" if on_states else "hermite-simpson"),
                      degree=chosen.degree or (4 if on_states else 3))

@@ -358,7 +358,7 @@ def common() -> Any:
 
 
 def test_what_cancels_has_no_effect() -> None:
-    """Rounding that unstable motions magnify to 1e-7 is told from sensitivities."""
+    """Rounding that unstable motions magnify to 1e-7 is distinguished from sensitivities."""
     with pytest.warns(SimulationWarning, match="depends on m, which cancels in its equations: the sensitivities are zero"):
         run = pendulum().simulate((0, 3), [1.0], params={"l": 1.1}, sensitivities=["m"])
     assert 0 < np.abs(run.sensitivity["m"]).max() < 1e-12

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # Relative differences up to which the times of events change alike, and matrices of two orders are the same.
 ALIKE, SAME = 1e-9, 1e-7
-# Part of its size that a gradient of a quantity must keep beside those of the others.
+# Part of its size that a gradient of a quantity must keep when those of the others are taken away.
 APART = 1e-5
 
 
