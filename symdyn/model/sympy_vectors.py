@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import sympy as sp
@@ -38,9 +39,7 @@ def new_point(name: str) -> Any:
 
 def as_point(value: Any, what: str) -> Any:
     """A Point as it is, or None. Raises ModelError for anything else."""
-    if value is not None and not is_point(value):
-        raise ModelError([f"{what} is {value!r}; pass a Point of sympy.physics.mechanics"])
-    return value
+    return _demanded(value, what, is_point, "Point")
 
 
 def located(point: Any, origin: Any, what: str) -> Any:
@@ -64,8 +63,12 @@ def new_frame(name: str) -> Any:
 
 def as_frame(value: Any, what: str) -> Any:
     """A ReferenceFrame as it is, or None. Raises ModelError for anything else."""
-    if value is not None and not is_frame(value):
-        raise ModelError([f"{what} is {value!r}; pass a ReferenceFrame of sympy.physics.mechanics"])
+    return _demanded(value, what, is_frame, "ReferenceFrame")
+
+
+def _demanded(value: Any, what: str, is_one: Callable[[Any], bool], kind: str) -> Any:
+    if value is not None and not is_one(value):
+        raise ModelError([f"{what} is {value!r}; pass a {kind} of sympy.physics.mechanics"])
     return value
 
 

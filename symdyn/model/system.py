@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -89,8 +89,8 @@ class System:
         if not isinstance(planar, (bool, np.bool_, NoneType)):
             self._faults.append(f"planar is {shown(planar)}; pass True, False or None")
             planar = None
-        frame = self._frame(frame, "the system's frame")
-        origin = self._origin(origin, "the system's origin")
+        frame = self._of_sympy(as_frame, frame, "the system's frame")
+        origin = self._of_sympy(as_point, origin, "the system's origin")
         if planar is None:
             planar = length_of(gravity) == 2
         self.planar = planar
@@ -150,8 +150,8 @@ class System:
         """
         where = f"body {shown(name)}"
         faults = self._faults
-        frame = self._frame(frame, f"{where}: frame")
-        origin = self._origin(origin, f"{where}: origin")
+        frame = self._of_sympy(as_frame, frame, f"{where}: frame")
+        origin = self._of_sympy(as_point, origin, f"{where}: origin")
         if inertia is None:
             matrix = sp.ImmutableMatrix(sp.zeros(3, 3))
         elif self.planar and not hasattr(inertia, "__len__") and not is_dyadic(inertia):
@@ -721,18 +721,10 @@ class System:
 
         return write_system(self, path)
 
-    def _frame(self, given: Any, what: str) -> Any:
-        """A ReferenceFrame that was given, or None."""
+    def _of_sympy(self, demanded: Callable[[Any, str], Any], given: Any, what: str) -> Any:
+        """What was given as `demanded` takes it, a ReferenceFrame or a Point, or None."""
         try:
-            return as_frame(given, what)
-        except ModelError as error:
-            self._faults.extend(error.faults)
-            return None
-
-    def _origin(self, given: Any, what: str) -> Any:
-        """A Point that was given, or None."""
-        try:
-            return as_point(given, what)
+            return demanded(given, what)
         except ModelError as error:
             self._faults.extend(error.faults)
             return None
