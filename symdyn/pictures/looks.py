@@ -6,7 +6,7 @@ that move, so that the same list holds at every configuration and for other valu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -32,6 +32,22 @@ _RAIL = 0.5
 # A point by its index, a point of a body (body, x, y, z), ("off", point, axis, distance), or ("foot", a, b, axis): the point
 # of the axis through a that is nearest to b.
 Ref = Any
+
+
+def point_of(ref: Ref, points: np.ndarray, axes: np.ndarray, of_body: Callable[[int, Sequence[float]], np.ndarray]) -> np.ndarray:
+    """The point that is referred to, by points (n_p, 3), axes of joints (n_j, 3), and where a body has a place of its own."""
+    def at(one: Ref) -> np.ndarray:
+        if isinstance(one, int):
+            return np.asarray(points[one])
+        if one[0] == "off":
+            return np.asarray(at(one[1]) + one[3] * axes[one[2]])
+        if one[0] == "foot":
+            a, n = at(one[1]), axes[one[3]]
+            return np.asarray(a + n * (n @ (at(one[2]) - a)))
+        body, *place = one
+        return np.asarray(of_body(body, place))
+
+    return at(ref)
 
 
 @dataclass(frozen=True)
@@ -111,14 +127,9 @@ class Mechanism:
 
     def at(self, ref: Ref) -> np.ndarray:
         """The point of the n-frame that is referred to."""
-        if isinstance(ref, int):
-            return np.asarray(self.points[ref])
-        if ref[0] == "off":
-            return np.asarray(self.at(ref[1]) + ref[3] * self.joint_axes[ref[2]])
-        if ref[0] == "foot":
-            a, n = self.at(ref[1]), self.joint_axes[ref[3]]
-            return np.asarray(a + n * (n @ (self.at(ref[2]) - a)))
-        body, *place = ref
+        return point_of(ref, self.points, self.joint_axes, self._of_body)
+
+    def _of_body(self, body: int, place: Sequence[float]) -> np.ndarray:
         if body == GROUND:
             return np.array(place, dtype=float)
         return np.asarray(self.frames[body, :3] + self.frames[body, 3:].reshape(3, 3) @ place)

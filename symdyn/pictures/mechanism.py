@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.jointed import carriers
-from symdyn.pictures.looks import GROUND, Mechanism, Ref, ropes_of
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, point_of, ropes_of
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
@@ -61,15 +61,7 @@ class Posed:
 
     def at(self, ref: Ref) -> np.ndarray:
         """The point that is referred to, see `looks.Ref`."""
-        if isinstance(ref, int):
-            return np.asarray(self.points[ref])
-        if ref[0] == "off":
-            return np.asarray(self.at(ref[1]) + ref[3] * self.axes[ref[2]])
-        if ref[0] == "foot":
-            a, n = self.at(ref[1]), self.axes[ref[3]]
-            return np.asarray(a + n * (n @ (self.at(ref[2]) - a)))
-        body, *place = ref
-        return np.asarray(self.origins[body] + self.rotations[body] @ place)
+        return point_of(ref, self.points, self.axes, lambda body, place: self.origins[body] + self.rotations[body] @ place)
 
 
 def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanism:
