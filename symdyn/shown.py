@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 LENGTH = 120
@@ -29,6 +30,11 @@ def name_of(value: Any) -> str:
     except Exception:  # of a user's own class
         name = value
     return str(name) if isinstance(name, str) else shown(name)
+
+
+def by_name(given: Mapping[Any, Any] | None) -> dict[str, Any]:
+    """A mapping with names in place of its keys, symbols or names; an empty one for None."""
+    return {} if given is None else {name_of(key): value for key, value in given.items()}
 
 
 def _of_derivative(value: Any) -> str:

@@ -19,7 +19,7 @@ from symdyn.real_numbers import number_of
 from symdyn.runtime.inputs.inputs import inputs_at
 from symdyn.runtime.integrating.simulate import start_of
 from symdyn.runtime.module import demand_module
-from symdyn.shown import name_of, shown
+from symdyn.shown import by_name, name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.given import Named, Names
@@ -89,7 +89,7 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
     named = _names(parameters, metadata.parameters, "parameters", "parameter", faults)
     states = _names(initial, metadata.x, "initial", "state", faults)
     defaults = dict(zip(metadata.parameters, metadata.defaults, strict=True))
-    guesses = {str(name_of(key)): value for key, value in _by_name(start, "start", "l: 1.0", faults).items()}
+    guesses = by_name(_mapping(start, "start", "l: 1.0", faults))
     faults += [f"start has {shown(key)}, which is not fitted" for key in guesses if key not in named]
     unknowns = []
     for name in named:
@@ -101,7 +101,7 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
     for k, measured in enumerate(experiments):
         unknowns += [Unknown(f"{state}(0)", k, _guess(module, measured.experiment, state), len(experiments)) for state in states]
     for k, measured in enumerate(experiments):
-        own = {str(name_of(key)) for key in measured.experiment.params}
+        own = by_name(measured.experiment.params)
         faults += [f"{name} is fitted, and experiment {k + 1} has a value of its own for it in params; leave one of them out"
                    for name in named if name in own]
     if not unknowns:
@@ -150,7 +150,7 @@ def _names(given: Any, there: Sequence[str], what: str, kind: str, faults: list[
     return found
 
 
-def _by_name(given: Any, what: str, example: str, faults: list[str]) -> Mapping[Any, Any]:
+def _mapping(given: Any, what: str, example: str, faults: list[str]) -> Mapping[Any, Any]:
     """A dictionary as it is, an empty one for None; anything else is a fault."""
     if given is None or isinstance(given, Mapping):
         return given or {}
@@ -163,7 +163,7 @@ def _pairs(given: Any, what: str, named: Sequence[str], states: Sequence[str],
     """Name -> two numbers; of initial values as "q1(0)"."""
     there = [*named, *[f"{state}(0)" for state in states]]
     result = {}
-    for key, pair in _by_name(given, what, "l: (0.5, 2.0)", faults).items():
+    for key, pair in _mapping(given, what, "l: (0.5, 2.0)", faults).items():
         name = str(name_of(key))
         if name not in there:
             faults.append(f"{what} has {shown(key)}, which is not fitted; fitted are {', '.join(there)}")
@@ -190,13 +190,13 @@ def _noise(given: Any, measured: Sequence[str], faults: list[str]) -> dict[str, 
     if given is None:
         return dict.fromkeys(measured, 1.0)
     each = given if isinstance(given, Mapping) else dict.fromkeys(measured, given)
-    by_name = {str(name_of(key)): value for key, value in each.items()}
-    faults += [f"noise has {shown(name)}, which is not measured" for name in by_name if name not in measured]
-    faults += [f"noise of {name} is missing" for name in measured if name not in by_name]
-    for name, value in by_name.items():
+    named = by_name(each)
+    faults += [f"noise has {shown(name)}, which is not measured" for name in named if name not in measured]
+    faults += [f"noise of {name} is missing" for name in measured if name not in named]
+    for name, value in named.items():
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
             faults.append(f"noise of {name} is {shown(value)}; it must be a positive number")
-    return {name: by_name.get(name, 1.0) for name in measured}
+    return {name: named.get(name, 1.0) for name in measured}
 
 
 def _guess(module: Module, experiment: Experiment, state: str) -> float:
@@ -206,7 +206,7 @@ def _guess(module: Module, experiment: Experiment, state: str) -> float:
         if state in names:
             given = getattr(experiment, group)
             if isinstance(given, Mapping):
-                given = {str(name_of(key)): v for key, v in given.items()}.get(state)
+                given = by_name(given).get(state)
             elif given is not None:
                 row = list(np.ravel(given))
                 if len(row) != len(names):
@@ -221,7 +221,7 @@ def _guess(module: Module, experiment: Experiment, state: str) -> float:
 def _on_constraints(module: Module, measured: Measured, guesses: Mapping[str, float], states: Sequence[str]) -> Start | None:
     """The start of an experiment as a function of what is fitted; None where no constraint ties its entries to that."""
     experiment, metadata = measured.experiment, module.metadata
-    p = module.parameters({**{str(name_of(key)): value for key, value in experiment.params.items()}, **guesses})
+    p = module.parameters({**by_name(experiment.params), **guesses})
     x, t = start_of(module, experiment.q, experiment.u, experiment.z), float(measured.t[0])
     if metadata.motions:
         module = module.following(inputs_at(experiment.inputs, t, metadata.inputs, metadata.initial, module.name,

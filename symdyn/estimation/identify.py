@@ -26,7 +26,7 @@ from symdyn.formulation.identification.regressor import PARAMETERS
 from symdyn.kinds import flag
 from symdyn.real_numbers import real_of
 from symdyn.runtime.module import demand_module
-from symdyn.shown import name_of, shown
+from symdyn.shown import by_name, shown
 
 if TYPE_CHECKING:
     from symdyn.given import Named, Row
@@ -281,8 +281,7 @@ def _noise(module: Module, given: Any, faults: list[str]) -> np.ndarray | None:
     if given is None:
         return None
     speeds = module.metadata.u
-    by_name = given if isinstance(given, Mapping) else dict.fromkeys(speeds, given)
-    each = {str(name_of(key)): value for key, value in by_name.items()}
+    each = by_name(given if isinstance(given, Mapping) else dict.fromkeys(speeds, given))
     faults += [f"noise has {shown(name)}, which is no speed; there are {', '.join(speeds)}" for name in each
                if name not in speeds]
     faults += [f"noise of {name} is missing" for name in speeds if name not in each]
@@ -330,7 +329,7 @@ def _charts(module: Module, given: Any, faults: list[str]) -> list[Chart]:
     if given is not None and not isinstance(given, Mapping):
         faults.append(f"nominal is {shown(given)}; pass a dictionary from bodies to ten numbers each")
         return []
-    own = {str(name_of(key)): value for key, value in (given or {}).items()}
+    own = by_name(given)
     faults += [f"nominal has {shown(name)}, which is no body; there are {', '.join(bodies)}" for name in own
                if name not in bodies]
     start[:] = list(module.metadata.initial_values("x").values())

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import real_of
-from symdyn.shown import name_of, shown
+from symdyn.shown import by_name, shown
 
 if TYPE_CHECKING:
     from symdyn.given import Named, Row, States
@@ -109,14 +109,14 @@ def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str])
 
     def table(values: Any, names: tuple[str, ...], what: str) -> np.ndarray:
         if isinstance(values, Mapping):
-            by_name = {str(name_of(key)): value for key, value in values.items()}
-            wrong = [f"{what} of {which} has {shown(name)}, which is none of {', '.join(names)}" for name in by_name
+            entries = by_name(values)
+            wrong = [f"{what} of {which} has {shown(name)}, which is none of {', '.join(names)}" for name in entries
                      if name not in names]
-            wrong += [f"{what} of {which} lacks {name}" for name in names if name not in by_name]
+            wrong += [f"{what} of {which} lacks {name}" for name in names if name not in entries]
             if wrong:
                 faults.extend(wrong)
                 return np.zeros((n, len(names)))
-            values = np.column_stack([np.broadcast_to(real_of(by_name[name], module.name, f"{name} of {which} must be numbers"),
+            values = np.column_stack([np.broadcast_to(real_of(entries[name], module.name, f"{name} of {which} must be numbers"),
                                                       (n,)) for name in names])
         array = real_of(values, module.name, f"{what} of {which} must be numbers")
         if array.shape == (n,) and len(names) == 1:
@@ -136,7 +136,7 @@ def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str])
     initial = metadata.initial_values("inputs")
     given: Any = list(initial.values()) if motion.inputs is None else motion.inputs
     if isinstance(given, Mapping):
-        given = {**initial, **{str(name_of(key)): value for key, value in given.items()}}
+        given = {**initial, **by_name(given)}
     elif np.shape(given) == (len(initial),) and len(initial) != n:
         given = np.broadcast_to(real_of(given, module.name, f"inputs of {which} must be numbers"), (n, len(initial)))
     inputs = table(given, metadata.inputs, "inputs") if initial else np.zeros((n, 0))

@@ -18,7 +18,7 @@ from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 from symdyn.estimation.experiment import Measured
 from symdyn.estimation.starts import Start
 from symdyn.runtime.integrating.simulate import simulate
-from symdyn.shown import name_of
+from symdyn.shown import by_name
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -175,7 +175,7 @@ class Problem:
     def _run(self, k: int, values: np.ndarray) -> Solution:
         experiment = self.experiments[k].experiment
         mine = [(unknown, float(v)) for unknown, v in zip(self.unknowns, values, strict=True) if unknown.experiment in (None, k)]
-        params = {**{str(name_of(key)): value for key, value in experiment.params.items()},
+        params = {**by_name(experiment.params),
                   **{u.name: v for u, v in mine if u.experiment is None}}
         initial = {u.state: v for u, v in mine if u.experiment is not None}
         start = self.starts[k]
@@ -202,7 +202,7 @@ class Problem:
             if not mine:
                 result[group] = given
             elif given is None or isinstance(given, Mapping):
-                result[group] = {**({str(name_of(key)): v for key, v in given.items()} if given else {}), **mine}
+                result[group] = {**by_name(given), **mine}
             else:
                 result[group] = [mine.get(name, value) for name, value in zip(names, np.ravel(given), strict=True)]
         return result

@@ -25,7 +25,7 @@ from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, 
 from symdyn.real_numbers import NotReal, real
 from symdyn.runtime.module import demand_module
 from symdyn.runtime.raised import InputRaised
-from symdyn.shown import name_of, shown
+from symdyn.shown import by_name, shown
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -256,17 +256,17 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
     as_motion = given is not None and not isinstance(given, Mapping)
     if as_motion:
         given = _of_motion(given, problem.free, faults)
-    by_name = {str(name_of(key)): value for key, value in (given or {}).items()}
-    if by_name:
+    named = by_name(given)
+    if named:
         times = None
-        if "t" in by_name:
-            times = _row(by_name.pop("t"), "t", faults)
+        if "t" in named:
+            times = _row(named.pop("t"), "t", faults)
             if times is not None and (len(times) < 2 or (np.diff(times) <= 0).any()):
                 faults.add("t of the guess must be two or more increasing times")
                 times = None
             elif times is not None:
                 T = float(np.clip(times[-1] - times[0], *problem.duration))
-        for key, value in by_name.items():
+        for key, value in named.items():
             name = faults.name(key, (*columns, *problem.free, "t"), "guess")
             row = _row(value, key, faults) if name is not None else None
             if name is None or row is None:
@@ -285,7 +285,7 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
     course = lambda names: lambda share: np.column_stack([np.interp(share, *columns[n]) for n in names]) if len(names) else (
         np.zeros((len(share), 0)))
     fixed = (problem.start[0] == problem.start[1]) & (problem.end[0] == problem.end[1])
-    leading = None if as_motion else tuple(n for n, both in zip(metadata.x, fixed, strict=True) if both or n in by_name)
+    leading = None if as_motion else tuple(n for n, both in zip(metadata.x, fixed, strict=True) if both or n in named)
     return _Course(course(metadata.x), course(metadata.inputs), p, T, leading)
 
 

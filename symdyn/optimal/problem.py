@@ -21,7 +21,7 @@ from symdyn.optimal.outputs import WithOutputs
 from symdyn.real_numbers import NotReal, number
 from symdyn.runtime.losses import Loss, output_names
 from symdyn.runtime.masses import real_parameters
-from symdyn.shown import name_of, shown
+from symdyn.shown import by_name, name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -191,7 +191,7 @@ def _values_of_parameters(module: Module, params: Any, free: Mapping[str, tuple[
     if params is None or isinstance(params, Mapping):
         middle = {name: (low + high) / 2 for name, (low, high) in free.items()
                   if name not in given and defaults[name] is None and np.isfinite(low + high)}
-        params = {**{str(name_of(key)): value for key, value in (params or {}).items()}, **middle}
+        params = {**by_name(params or {}), **middle}
     return np.array(real_parameters(module, params))
 
 
