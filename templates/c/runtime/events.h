@@ -3,6 +3,9 @@
 #pragma once
 
 #include "start.h"
+#if SYMDYN_SENSITIVE || SYMDYN_KEEPS_RESETS
+#include "pivots.h"
+#endif
 #if SYMDYN_KEEPS_RESETS
 #include "resets.h"
 #endif
@@ -411,8 +414,8 @@ static int symdyn_slope_between(
     *clear = 1;
     for (int times = 2; times > 0; times--)
         for (int round = 0; round < 3; round++) {
-            double gap[SYMDYN_N_EVENTS];
-            int open[SYMDYN_N_EVENTS];
+            double gap[SYMDYN_N_EVENTS], own[SYMDYN_N_EVENTS];
+            int open[SYMDYN_N_EVENTS], order[SYMDYN_N_EVENTS];
             way[0] = 1.0;
             for (int i = 0; i < N; i++) way[1 + i] = slope[i];
             for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
@@ -428,38 +431,15 @@ static int symdyn_slope_between(
                     G[k][l] = 0.0;
                     for (int i = 0; i <= N; i++) G[k][l] += g[k][i] * g[l][i];
                 }
+                own[k] = 0.0;
+                for (int i = 0; i <= N; i++) own[k] += g[k][i] * g[k][i];
                 open[k] &= size_k > 0.0;
             }
-            // The least change of the way that makes up for the gaps, by elimination with the largest pivots.
-            int order[SYMDYN_N_EVENTS], n = 0;
-            for (int best = 0; best >= 0;) {
-                double largest = 1e-10;
-                best = -1;
-                for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
-                    double own = 0.0;
-                    for (int i = 0; i <= N; i++) own += g[k][i] * g[k][i];
-                    if (open[k] && G[k][k] > largest * own) {
-                        largest = G[k][k] / own;
-                        best = k;
-                    }
-                }
-                if (best < 0) break;
-                open[best] = 0;
-                order[n++] = best;
-                for (int k = 0; k < SYMDYN_N_EVENTS; k++)
-                    if (open[k]) {
-                        const double factor = G[k][best] / G[best][best];
-                        gap[k] -= factor * gap[best];
-                        for (int l = 0; l < SYMDYN_N_EVENTS; l++) G[k][l] -= factor * G[best][l];
-                    }
-            }
+            // The least change of the way that makes up for the gaps.
+            const int n = symdyn_solve_open(SYMDYN_N_EVENTS, &G[0][0], own, gap, open, order);
             for (int k = 0; k < SYMDYN_N_EVENTS; k++) *clear &= !open[k];
-            for (int m = n - 1; m >= 0; m--) {
-                const int k = order[m];
-                for (int other = m + 1; other < n; other++) gap[k] -= G[k][order[other]] * gap[order[other]];
-                gap[k] /= G[k][k];
-                for (int i = 0; i <= N; i++) way[i] += gap[k] * g[k][i];
-            }
+            for (int m = n - 1; m >= 0; m--)
+                for (int i = 0; i <= N; i++) way[i] += gap[order[m]] * g[order[m]][i];
             for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? x[i] + times * step * way[1 + i] : x[i];
             if ((failure = symdyn_eval(run, t + times * step * way[0], y, slope))) return failure;
             if (times == 2)

@@ -2,6 +2,7 @@
 // its order.
 #pragma once
 
+#include "pivots.h"
 #include "projection.h"
 
 // What an entry of [q; u] counts by: angles count times the length.
@@ -16,41 +17,19 @@ static double symdyn_arm(const symdyn_run *run, int i) {
 static int symdyn_close(symdyn_run *run, double t, const double *x, int *open, double *gap, double *of) {
     enum { WIDTH = SYMDYN_NQ + SYMDYN_NU };
     double rows[SYMDYN_HELD * WIDTH], G[SYMDYN_HELD][SYMDYN_HELD];
-    int order[SYMDYN_HELD], n = 0;
+    double sizes[SYMDYN_HELD];
+    int order[SYMDYN_HELD];
     if (symdyn_reset_directions_at(&run->problem, t, x, rows) || !symdyn_all_finite(rows, SYMDYN_HELD * WIDTH)) return 1;
     for (int i = 0; i < SYMDYN_HELD; i++) {
-        const double own = rows[WIDTH * i + symdyn_held[i]];
         double most = 0.0;
+        sizes[i] = rows[WIDTH * i + symdyn_held[i]];
         for (int j = 0; j < SYMDYN_HELD; j++) G[i][j] = rows[WIDTH * j + symdyn_held[i]];
         for (int j = 0; j < WIDTH; j++) most = fmax(most, fabs(rows[WIDTH * i + j]) * symdyn_arm(run, j));
-        open[i] &= 1e6 * own * symdyn_arm(run, symdyn_held[i]) > most;
+        open[i] &= 1e6 * sizes[i] * symdyn_arm(run, symdyn_held[i]) > most;
     }
-    for (int best = 0; best >= 0;) {
-        double most = 1e-10;
-        best = -1;
-        for (int i = 0; i < SYMDYN_HELD; i++) {
-            const double size = rows[WIDTH * i + symdyn_held[i]];
-            if (open[i] && G[i][i] > most * size) {
-                most = G[i][i] / size;
-                best = i;
-            }
-        }
-        if (best < 0) break;
-        open[best] = 0;
-        order[n++] = best;
-        for (int i = 0; i < SYMDYN_HELD; i++)
-            if (open[i]) {
-                const double factor = G[i][best] / G[best][best];
-                gap[i] -= factor * gap[best];
-                for (int j = 0; j < SYMDYN_HELD; j++) G[i][j] -= factor * G[best][j];
-            }
-    }
-    for (int last = n, k = n - 1; k >= 0; k--) {
-        const int i = order[k];
-        for (int other = k + 1; other < last; other++) gap[i] -= G[i][order[other]] * gap[order[other]];
-        gap[i] /= G[i][i];
-        for (int j = 0; j < WIDTH; j++) of[j] += gap[i] * rows[WIDTH * i + j];
-    }
+    const int n = symdyn_solve_open(SYMDYN_HELD, &G[0][0], sizes, gap, open, order);
+    for (int k = n - 1; k >= 0; k--)
+        for (int j = 0; j < WIDTH; j++) of[j] += gap[order[k]] * rows[WIDTH * order[k] + j];
     for (int i = 0, k; i < SYMDYN_HELD; i++) {
         for (k = 0; k < n && order[k] != i; k++) continue;
         if (k == n) gap[i] = 0.0;
