@@ -27,7 +27,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
          batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
          adjoint: tuple[str, ...] | None = None, held: tuple[str, ...] = (),
-         followed: tuple[str, ...] = (), open_contacts: bool = False) -> Source:
+         followed: tuple[str, ...] = (), open_contacts: bool = False, threads: bool = False) -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -39,6 +39,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     adjoint      what weights of x_dot are carried back to by further functions, see RightSide
     held, followed   inputs with derivatives along these further states, see RightSide
     open_contacts   leave out what closed rigid contacts do, see RightSide
+    threads      C only: the text of a kernel that integrates many motions by a thread each, see RightSide
     states       how many random states the reference vectors of a standalone source begin with
 
     Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
@@ -53,10 +54,11 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     names = groups.written(equations, functions, method if integrator and backend == "c" else None)
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
-        columns = columns_of if backend == "c" and not standalone and templates is None else None
-        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts)
+        # Devices have no SIMD lanes within a thread.
+        columns = columns_of if backend == "c" and not standalone and not threads and templates is None else None
+        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts, threads)
         content = content_of(equations, names, standalone, bound, right_side, columns)
-        return render(content, backend, templates, standalone, integrator, batch, method, states)
+        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads)
 
 
 def write_source(source: Source, folder: Path) -> list[Path]:

@@ -137,10 +137,11 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
     return result
 
 
-def switches(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> dict[str, bool]:
+def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads: bool) -> dict[str, bool]:
     """Macros by which parts are left out.
 
     gathered   what the method's template gets besides
+    threads    whether there is a kernel that integrates many motions by a thread each
     """
     tableau = method.tableau
     return {"SYMDYN_EXPLICIT": tableau is not None, "SYMDYN_RADAU": method.template == "radau",
@@ -155,4 +156,5 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> dict[
             "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0, "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
             "SYMDYN_HAS_INPUTS": shape.sizes["inputs"] > 0, "SYMDYN_EVENTS": bool(shape.events),
             "SYMDYN_HAS_RESETS": bool(shape.resets), "SYMDYN_KEEPS_RESETS": bool(shape.held),
-            "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves)}
+            "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves),
+            "SYMDYN_THREADS": threads}

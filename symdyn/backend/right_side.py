@@ -20,6 +20,7 @@ class RightSide:
     held        inputs whose derivatives along the columns are parameters: those of x_dot by them count, too
     followed    inputs that follow the state by a function of the user, whose derivatives along the columns are further inputs
     open_contacts   whether all rigid contacts are open, whatever their parameters say: what they do is left out
+    threads     whether it is a text for devices, with a kernel that integrates many motions by a thread each
     adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
@@ -31,6 +32,7 @@ class RightSide:
     held: tuple[str, ...] = ()
     followed: tuple[str, ...] = ()
     open_contacts: bool = False
+    threads: bool = False
 
     @property
     def in_lanes(self) -> bool:
@@ -44,7 +46,8 @@ class RightSide:
         parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte),
                  (f"the method {self.method}", self.method != METHOD),
                  (f"sensitivities in {len(self.sensitivities)} columns", bool(self.sensitivities)),
-                 ("the way back", self.adjoint is not None), ("all contacts open", self.open_contacts))
+                 ("the way back", self.adjoint is not None), ("all contacts open", self.open_contacts),
+                 ("a kernel of many motions", self.threads))
         added = " and ".join(text for text, there in parts if there)
         return f"rhs with {added}" if added else "rhs"
 

@@ -120,7 +120,7 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
            integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
-           only: Sequence[str] = ()) -> Source:
+           only: Sequence[str] = (), threads: bool = False) -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -128,6 +128,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     integrator   C only: with the compiled integrator (needs the function rhs)
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
+    threads      C only: with the integrator of many trajectories by a thread each, which also compiles as CUDA C
     states       how many random states the reference vectors begin with
     only         the templates of the files that are wanted, without reference vectors; none: all, or the first one where they are
                  not standalone
@@ -158,6 +159,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
     context = _context(content, program, dialect, standalone, integrator, lanes, many, method, 0 if only else states)
+    context["threads"] = threads
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
@@ -204,11 +206,12 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
                   content.carried)
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
-             and method.template != "taylor")
+             and not context["threads"] and method.template != "taylor")
     called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
-    return {"runtime": Parts(read, switches(method, shape, gathered)), "runtime_sizes": runtime_sizes(method, shape, gathered),
+    return {"runtime": Parts(read, switches(method, shape, gathered, context["threads"])),
+            "runtime_sizes": runtime_sizes(method, shape, gathered),
             "integrated": called, "sensitive": shape.columns > 0, "resets": shape.resets, "held": shape.held,
-            "divided": units, "linked": "SYMDYN_HIDDEN" if units else "static"}
+            "divided": units, "linked": "SYMDYN_HIDDEN" if units else "SYMDYN_APART static" if context["threads"] else "static"}
 
 
 # Reading the templates takes longer than filling them in, and the shipped ones stay as they are.

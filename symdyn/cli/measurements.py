@@ -112,6 +112,9 @@ MEASUREMENTS: dict[str, Measurement] = {
                    "KanesMethod's equations to, a minute at most each"}))),
     "batch": Measurement(
         "symdyn.lab.batch:run", "many states and motions at once, compared with one after the other and Pinocchio", (_ONLY,)),
+    "gpu": Measurement(
+        "symdyn.lab.gpu:run", "a million motions on a GPU compared with the processor; without one, what kernels need",
+        (_ONLY,)),
     "sweep": Measurement(
         "symdyn.lab.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
             _number("--count", "count", "motions (default: 1000000)"),

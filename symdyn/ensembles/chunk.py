@@ -26,8 +26,8 @@ GROUPS = ("q", "u", "z", "parameters", "inputs")
 MESSAGE = 400
 # Members whose doubts are listed.
 LISTED = 3
-# Numbers of motions that are held at a time, 8 bytes each.
-NUMBERS = 2**21
+# Numbers of motions that are held at a time, 8 bytes each; of a device, which computes more of them at once.
+NUMBERS, NUMBERS_OF_DEVICE = 2**21, 2**27
 
 
 class MemberFailed(SymdynError):
@@ -44,7 +44,8 @@ class Setting:
     consistent   begin with the nearest state that fulfils the constraints, what is sampled kept
     options      of `simulate`
     shapes       of the outcomes of one member
-    vectors      several members are integrated at once on one processor core
+    vectors      several members are integrated at once on one processor core, or on a device
+    device       "cpu", or the GPU that integrates them
     """
 
     system: Any
@@ -57,6 +58,7 @@ class Setting:
     options: Mapping[str, Any]
     shapes: tuple[tuple[int, ...], ...] = ()
     vectors: bool = False
+    device: str = "cpu"
 
 
 @dataclass(frozen=True)
@@ -131,12 +133,13 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
     """Simulate samples, by their places, several at once."""
     module: Module = setting.system.module
     states, times = list(module.metadata.x), setting.times
-    at_once = max(1, NUMBERS // (len(times) * len(states)))
+    numbers = NUMBERS if setting.device == "cpu" else NUMBERS_OF_DEVICE
+    at_once = max(1, numbers // (len(times) * len(states)))
     for part in (rows[k:k + at_once] for k in range(0, len(rows), at_once)):
         groups = _groups(setting, values[part])
         try:
             batch = module.simulate_batch(groups["q"], groups["u"], groups["parameters"], z=groups["z"], t=times,
-                                          inputs=groups["inputs"], **setting.options)
+                                          inputs=groups["inputs"], device=setting.device, **setting.options)
         except SymdynError as error:  # of all of them: each reports it for itself
             _raise_others(error)
             _one_by_one(setting, values, part, done)

@@ -9,7 +9,7 @@ import tempfile
 import time as clock
 import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.ensembles.chunk import LISTED, Chunk, Setting, motion, quiet, setting_of, vectors_serve
 from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
@@ -29,8 +30,11 @@ from symdyn.ensembles.store import Store, check_folder, check_same, write_manife
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped, SimulationWarning
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
+from symdyn.runtime.batches.on_device import demand_fit
 from symdyn.runtime.batches.states import UNIT
+from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.inputs.inputs import varies_over_time
+from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
@@ -44,7 +48,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import InputValues
 
 # Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
-CHUNK, PARTS = 1000, 16
+CHUNK, CHUNK_OF_DEVICE, PARTS = 1000, 100_000, 16
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
 TRIED = 8
 # From so many samples on it is worth compiling code that integrates several motions at once.
@@ -59,7 +63,7 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
              method: str | type | None = None, max_step: float | None = None, first_step: float | None = None,
              max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
              events: bool | str | Sequence[str] | None = None, event_spacing: float | None = None,
-             sensitivities: Names | None = None) -> Ensemble:
+             sensitivities: Names | None = None, device: str = "cpu") -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -85,6 +89,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     rtol, atol, method, max_step, first_step, max_steps, stabilization, events, event_spacing   of `simulate`; None: as there
     sensitivities   what outcomes with "grad" are by, as for `simulate`: parameters, inputs, and initial values as "q1(0)";
                 default: what is sampled
+    device      "cpu", or "gpu", "gpu:1": members are integrated on an NVIDIA GPU, as `simulate_batch` does; chunks are 100,000
+                samples, and one thread hands them to it, unless asked otherwise
 
     From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
     that fails has no numbers in its row, and is listed in `failures`. Warnings of single motions are not given, but one
@@ -110,16 +116,19 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     measures = take_measures(outcomes, module)
     options |= _derivatives(module, drawn, measures, sensitivities)
     times = output_times(t, measures, module)
-    vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
-    portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions,
-                                       *[UNIT] * vectors])
+    gpu = devices.device_number(device, module.name)
+    if gpu is not None:
+        _check_device(module, gpu, options, consistent)
+    vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options))
+    together = [UNIT if gpu is None else RightSide(method=str(options.get("method", METHOD)), threads=True)] if vectors else []
+    portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions, *together])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
     if varies_over_time(inputs):
         raise ArgumentError(f"{module.name}: an ensemble takes numbers as inputs, found {shown(inputs, 80)}; write what goes "
                             "over time as an expression in sd.t, with parameters that samples may change, or run "
                             "module.simulate_batch, which takes functions, splines and tables")
     setting = setting_of(portable, drawn.names, times, measures, given, consistent, options)
-    setting = replace(setting, vectors=vectors)
+    setting = replace(setting, vectors=vectors, device="cpu" if gpu is None else device)
     size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)
     if path is not None:
         if not isinstance(path, (str, Path)) or "\0" in str(path):
@@ -134,6 +143,16 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
         raise
     weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)
     return result
+
+
+def _check_device(module: Module, number: int, options: Mapping[str, Any], consistent: bool) -> None:
+    """Raises ArgumentError for what a device does not take, and where it is not there; MissingExtra."""
+    others = {name: value for name, value in options.items() if name not in ("events", "event_spacing")}
+    demand_fit(module, options.get("method", METHOD), None, others, bool(wanted(module, options.get("events", True)).any()))
+    if consistent:
+        raise ArgumentError(f"{module.name}: device='gpu' takes starts as they are; leave consistent out, or sample starts that "
+                            "fulfil the constraints")
+    devices.open_device(number, module.name).close()
 
 
 def _told(result: Ensemble) -> Ensemble:
@@ -161,7 +180,8 @@ def _derivatives(module: Module, samples: Samples, measures: Sequence[Measure], 
 def _in_folder(folder: Path, setting: Setting, samples: Samples, executor: Any, size: int | None, ahead: int | None,
                resume: bool, progress: bool, lasting: bool) -> Ensemble:
     found = check_folder(folder, resume)
-    size = size or (found or {}).get("chunk") or min(CHUNK, -(-samples.count // PARTS))
+    largest = CHUNK if setting.device == "cpu" else CHUNK_OF_DEVICE
+    size = size or (found or {}).get("chunk") or min(largest, -(-samples.count // PARTS))
     with quiet():
         setting = _tried(setting, samples)
         manifest = _manifest(setting, samples, size)
@@ -256,7 +276,8 @@ class _Run:
                                 f"found {shown(given)}")
 
         def make() -> Executor:
-            own.append(ThreadPoolExecutor(os.cpu_count() or 1) if given is None else given())
+            workers = (os.cpu_count() or 1) if self.setting.device == "cpu" else 1
+            own.append(ThreadPoolExecutor(workers) if given is None else given())
             return own[-1]
 
         return make, True, own
@@ -306,7 +327,7 @@ def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:
             "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": samples.record(),
             "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
             "outcomes": {m.label: m.record() for m in setting.measures}, "consistent": setting.consistent,
-            "vectors": setting.vectors,
+            "vectors": setting.vectors, **({} if setting.device == "cpu" else {"device": setting.device}),
             "base": {k: v.tolist() for k, v in setting.base.items()},
             "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}
 

@@ -6,6 +6,7 @@ A sweep file is data, which may come from anyone: it runs no program, and its re
     options = {n = 2}                   # of the system
     t = [0, 10]                         # s; or {from = 0, to = 10, count = 101}
     rtol = 1e-8
+    device = "gpu"                      # default: the processor
     sampling = "latin_hypercube"        # or random, sobol, grid, paired
     count = 1000
     seed = 1
@@ -44,9 +45,9 @@ TABLES = {"parameters": ("parameters",), "initial": ("q", "u", "z"), "inputs": (
 # Key -> what its value must be.
 KEYS = {"system": "text", "options": "table", "formulation": "text", "coordinates": "text", "t": "times", "rtol": "positive",
         "atol": "positive", "method": "text", "max_steps": "whole", "max_step": "positive", "stabilization": "text",
-        "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
+        "device": "text", "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
         "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs", "output": "folder", **dict.fromkeys(TABLES, "table")}
-OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities")
+OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities", "device")
 # No double is larger; whole numbers of TOML have any number of digits.
 LARGEST = sys.float_info.max
 CHOICES = {"formulation": ("auto", "embedding", "recursive", "augmented"), "coordinates": ("relative", "absolute"),

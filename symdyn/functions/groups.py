@@ -50,6 +50,8 @@ def written(equations: Equations, functions: Sequence[str] | None, method: str |
 def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...]:
     """The functions in the library of a right-hand side and its integrator."""
     names = ["rhs", *(CORRECTIONS if equations.constraints else ())]
+    if right_side.threads:  # kernels look for no events
+        return tuple(names)
     if right_side == RightSide():  # evaluated in or after every simulation
         names += [n for n in ("watches", "switches") if has_function(equations, n)]
     if right_side.adjoint is not None:

@@ -795,7 +795,7 @@ class Module:
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
                        interpolation: str = "linear", extend: str = "error",
                        sensitivities: Names | Named[Row] | None = None,
-                       sensitivity_control: bool = True) -> BatchSolution:
+                       sensitivity_control: bool = True, device: str = "cpu") -> BatchSolution:
         """Integrate many motions of one mechanism, each with its own steps.
 
         q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
@@ -810,6 +810,10 @@ class Module:
         sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions, which run one by one then; see
                     `BatchSolution.sensitivity`
 
+        device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
+                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are those of the processor to 1e-12 where motions do
+                    not magnify rounding
+
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, projections onto constraints included, and a lane that is through goes on with the next motion.
         Mechanisms with events or rigid contacts, inputs that vary over time, other methods and options, and the NumPy backend run
@@ -818,7 +822,7 @@ class Module:
         A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions
         loads leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
-        ArgumentError for what does not fit.
+        ArgumentError for what does not fit, for a device that is not there and for what it cannot take.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1)).x.shape
@@ -829,7 +833,7 @@ class Module:
         return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
                               first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
                               events=events, event_spacing=event_spacing, interpolation=interpolation, extend=extend,
-                              sensitivities=sensitivities, sensitivity_control=sensitivity_control)
+                              sensitivities=sensitivities, sensitivity_control=sensitivity_control, device=device)
 
     # -- statics and linearization
 

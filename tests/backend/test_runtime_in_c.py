@@ -37,7 +37,8 @@ Build = Callable[..., ctypes.CDLL]
 def build(tmp_path: Path) -> Build:
     """build(text): the library of a text that includes parts, in which no tool that is here finds a fault."""
     def library(text: str, *options: str) -> ctypes.CDLL:
-        (tmp_path / "main.c").write_text(text)
+        threads = "" if "SYMDYN_THREADS" in text else "#define SYMDYN_THREADS 0\n"
+        (tmp_path / "main.c").write_text(threads + text)
         made = tmp_path / "main.so"
         done = subprocess.run([*require_compiler().command, *STRICT, *options, f"-I{RUNTIME}", f"-I{tmp_path}", "-o", made,
                                tmp_path / "main.c", "-lm"], capture_output=True, text=True)
@@ -65,7 +66,7 @@ def integrator(method: str, shape: Shape, functions: dict[str, str], tmp_path: P
                      for name, body in functions.items())
     (tmp_path / "model.h").write_text(bodies + tables_text)
     macros = dict(sizes(record, shape, gathered))
-    macros = {name: int(on) for name, on in switches(record, shape, gathered).items()} | macros
+    macros = {name: int(on) for name, on in switches(record, shape, gathered, False).items()} | macros
     head = "".join(f"#define {name} {value}\n" for name, value in macros.items())
     return (f'{head}#define SYMDYN_NAME(function) symdyn_##function\n#define SYMDYN_LINKED static\n'
             f'#define SYMDYN_MODEL "model.h"\n#include "runtime.c"\n{further}')

@@ -39,7 +39,7 @@ double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(dou
 #else
 #define SYMDYN_EXPORT
 #endif
-#if !defined(__GNUC__)
+#if !defined(__GNUC__) && !defined(__CUDACC__)
 #define __attribute__(list)
 #endif
 
@@ -765,10 +765,10 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
     void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
     const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
-    static const symdyn_run empty;
+    static const symdyn_run empty = {0};
     int bad = !(length <= symdyn_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
     *run = empty;
     run->problem = *problem;
@@ -889,7 +889,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
         if (failure) return failure;
@@ -907,8 +907,8 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
 
 // What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
-    const symdyn_run *const run = memory;
-    *report = (symdyn_report){
+    const symdyn_run *const run = (const symdyn_run *)memory;
+    const symdyn_report now = {
         .status = run->status,
         .t = run->t,
         .h = run->h,
@@ -929,6 +929,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
         .n_jacobians = run->n_jacobians,
         .n_factorizations = run->n_factorizations,
     };
+    *report = now;
     for (int i = 0; i < SYMDYN_NX; i++) {
         states[i] = run->x[i];
         states[SYMDYN_NX + i] = run->x_fail[i];

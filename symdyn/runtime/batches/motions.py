@@ -5,24 +5,26 @@ from __future__ import annotations
 import ctypes
 import time as clock
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows, together
+from symdyn.runtime.batches.on_device import on_device
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
-from symdyn.runtime.batches.starts import consistent_starts, projects
+from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
+from symdyn.runtime.batches.together import LISTED, Asked, Together, warn
 from symdyn.runtime.batches.validity import outside
+from symdyn.runtime.gpu.device import device_number
 from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
-from symdyn.runtime.integrating.compiled import FAR, moved_far
 from symdyn.runtime.integrating.events import wanted
-from symdyn.runtime.integrating.run_record import STATUS, RunReport
 from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.integrating.simulate import (
     checked_method,
@@ -31,8 +33,6 @@ from symdyn.runtime.integrating.simulate import (
     checked_times,
     checked_tolerances,
 )
-from symdyn.runtime.integrating.stops import describe_stop
-from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.memory import demand
 
 if TYPE_CHECKING:
@@ -45,32 +45,17 @@ PATIENCE = 4
 # The method of motions that are integrated at once.
 METHOD = "dop853"
 NO_VECTORS = "the C compiler has no vectors"
-LISTED = 3
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies."""
-
-    n: int
-    starts: np.ndarray
-    params: np.ndarray
-    inputs: np.ndarray
-    times: np.ndarray
-    span: tuple[float, float]
-    rtol: float
-    atol: np.ndarray
-    max_step: float
-    first_step: float
 
 
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
                    inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
                    first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
                    events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                   extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True) -> BatchSolution:
+                   extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True,
+                   device: Any = "cpu") -> BatchSolution:
     """See Module.simulate_batch."""
     metadata = module.metadata
+    gpu = device_number(device, module.name)
     checked_method(module, method)
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
@@ -98,25 +83,37 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
                         metadata.motions) if by_time else None
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
-    asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
+    asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
     note = why_one_by_one(module, has_events) or _why_these(by_time, options) or ("one by one: with sensitivities" if by else "")
     if by:
         options |= {"sensitivities": by, "sensitivity_control": sensitivity_control}
-    options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
-    if by_time:
-        options |= {"interpolation": interpolation, "extend": extend}
-    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
+    over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
     varying = inputs if by_time else None
+    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
+    if gpu is not None:
+        alone = {name: value for name, value in options.items() if name == "method"} | over_time
+        solution = on_device(module, asked, gpu, along, options, has_events,
+                             lambda which: _alone(module, asked, which, varying, alone))
+        if along is not None and along.pieces is not None and given.ndim == 3:
+            given[:] = along.pieces.at(times)
+        return _warned(module, asked, solution, given)
+    options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
+    options |= over_time
     solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
+    return _warned(module, asked, solution, given)
+
+
+def _warned(module: Module, asked: Asked, solution: BatchSolution, given: np.ndarray) -> BatchSolution:
+    """The same, after warnings of what failed and of what is not meant. given: inputs, see `outside`."""
     if solution.messages:
         examples = [f"{k}: {message}" for k, message in list(solution.messages.items())[:LISTED]]
         more = f"; and {len(solution.messages) - LISTED} more, see `messages`" if len(solution.messages) > LISTED else ""
-        warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(examples)}{more}", SimulationWarning,
-                      stacklevel=3)
-    near = locked(module, times, solution.x, asked.rtol) if metadata.charts else []
-    for sentence in outside(module, times, solution.x, asked.params, given) + near:
-        warnings.warn(sentence, SimulationWarning, stacklevel=3)
+        warnings.warn(f"{len(solution.messages)} of {asked.n} motions failed: {'; '.join(examples)}{more}", SimulationWarning,
+                      stacklevel=4)
+    near = locked(module, asked.times, solution.x, asked.rtol) if module.metadata.charts else []
+    for sentence in outside(module, asked.times, solution.x, asked.params, given) + near:
+        warnings.warn(sentence, SimulationWarning, stacklevel=4)
     return solution
 
 
@@ -157,108 +154,44 @@ def _why_these(by_time: bool, options: Mapping[str, Any]) -> str:
 # -- on vectors
 
 
-def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
+def _on_vectors(module: Module, asked: Asked) -> BatchSolution:
     unit: Any = module.unit(UNIT)
-    n, n_x = asked.n, module.metadata.sizes.x
-    x = np.full((n, len(asked.times), n_x), np.nan)
-    reports = np.zeros(n, dtype=np.dtype(RunReport))
-    reports["status"] = STATUS.STEP_LIMIT
-    states = np.full((n, 2, n_x), np.nan)
+    together = Together(module, asked)
+    n = asked.n
     size = unit.function("batch_size")
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
-    span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
-    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
-    out = (ctypes.c_void_p * 2)(x.ctypes.data, states.ctypes.data)
-    params, wrong = _real(module, asked)
-    starts, lengths, astray = consistent_starts(module, asked.span[0], asked.starts, params, n)
-    tables = tables_of([starts, asked.inputs, params, lengths])
+    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, asked.atol, asked.times)])
+    out = (ctypes.c_void_p * 2)(together.x.ctypes.data, together.states.ctypes.data)
+    tables = tables_of([together.starts, asked.inputs, together.params, together.lengths])
     go = unit.function("batch_go")
     go.restype = ctypes.c_long
-    begun = clock.perf_counter()
     interrupted, done, waited = False, 0, 0
     doubtful = bool(module.metadata.switches) or projects(module)
     try:
         unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
-                                     ctypes.c_void_p(reports.ctypes.data))
+                                     ctypes.c_void_p(together.reports.ctypes.data))
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (doubtful and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
-    wrong |= astray
-    success, counts, late = reports["status"] == STATUS.DONE, _counts(reports), reports["status"] == STATUS.STEP_LIMIT
-    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
-    note = "" if width(module) > 1 else NO_VECTORS
-    if late.any() and not interrupted:
-        why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
-               "their steps may have become too short")
-        note = f"{late.sum()} of {n} motions one by one: they took more than {PATIENCE * PIECE} steps, and {why}"
-    moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
-    _warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
-    if projects(module):  # what keeps a state from the constraints, a run of its own finds out
-        late |= ~success
-        late[list(wrong)] = False
-    if late.any() and not interrupted:
-        again = np.flatnonzero(late)
-        single = _alone(module, asked, again)
-        x[again], success[again] = single.x, single.success
-        counts[again] = np.column_stack([single.n_steps, single.n_rejected])
-        messages = {k: message for k, message in messages.items() if not late[k]}
-        messages |= {int(again[k]): message for k, message in single.messages.items()}
-    solution = BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
-                             width(module), note, clock.perf_counter() - begun)
-    if interrupted:
-        raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
-    return solution
+    return together.solution(unit, width(module), "" if width(module) > 1 else NO_VECTORS, interrupted, PATIENCE * PIECE,
+                             lambda which: _alone(module, asked, which))
 
 
-def _alone(module: Module, asked: _Asked, which: np.ndarray) -> BatchSolution:
+def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any = None,
+           options: Mapping[str, Any] = MappingProxyType({})) -> BatchSolution:
     """Some motions one by one: a run of its own finds out whether a motion chatters and what led it off its constraints."""
     part = replace(asked, n=len(which), **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
                                            for name in ("starts", "params", "inputs")})
-    return _one_by_one(module, part, None, part.inputs, "", {"events": False})
-
-
-def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
-    """The parameters, NaN in rows with masses that no body has, and what to say of these."""
-    wrong = negative_masses(module, asked.params)
-    if not wrong:
-        return asked.params, wrong
-    if len(asked.params) == 1:
-        raise ArgumentError(wrong[0])
-    params = asked.params.copy()
-    params[list(wrong)] = np.nan
-    return params, wrong
-
-
-def _counts(reports: np.ndarray) -> np.ndarray:
-    """Accepted steps and attempts given up, (n, 2)."""
-    return np.column_stack([reports["n_steps"], reports["n_rejected"]])
-
-
-def _message(unit: Any, row: np.ndarray, states: np.ndarray) -> str:
-    of, metadata = RunReport.from_buffer_copy(row.tobytes()), unit.metadata
-    if of.status == STATUS.STEP_LIMIT:
-        return f"{metadata.name}: not finished"
-    reason, bad = unit.reason(of.reason), of.bad_index
-    if of.status == STATUS.NO_CONSTANTS:
-        return f"{metadata.name}: {reason}; check the parameters"
-    failed = of.status in (STATUS.FIELD_FAILED, STATUS.STATE_NOT_FINITE)
-    x = states[int(failed)]
-    if of.status == STATUS.BAD_ARGUMENT:
-        wrong = [name for name, value in zip(metadata.x, x, strict=True) if not np.isfinite(value)]
-        return f"{metadata.name}: the start is not finite: {', '.join(wrong)}"
-    why = {STATUS.FIELD_FAILED: reason, STATUS.STEP_TOO_SMALL: f"the step became too small ({of.h:.3g} s) for the tolerances",
-           STATUS.STATE_NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
-    return describe_stop(metadata, of.t_fail if failed else of.t, x,
-                         why.get(of.status, f"the integrator does not go on (status {of.status})"))
+    return _one_by_one(module, part, inputs, part.inputs, "", {"events": False, **options})
 
 
 # -- one by one
 
 
-def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, note: str,
+def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, note: str,
                 options: Mapping[str, Any]) -> BatchSolution:
     """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary."""
     n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
@@ -311,12 +244,5 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
             used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
         if not done.success:
             messages[k] = done.message
-    _warn(doubts, n)
+    warn(doubts, n)
     return solution()
-
-
-def _warn(doubts: Sequence[str], n: int) -> None:
-    """Warns of some of n motions, if there are any."""
-    if doubts:
-        more = f"; and {len(doubts) - LISTED} more" if len(doubts) > LISTED else ""
-        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=5)

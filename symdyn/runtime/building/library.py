@@ -63,6 +63,13 @@ class Frame(ctypes.Structure):
     failed: int
 
 
+def reason_of(metadata: Metadata, code: int) -> str:
+    """What a return code of a function in C means."""
+    if code == NOT_FINITE:
+        return "the result is not finite"
+    return metadata.reasons[code - 1] if 0 < code <= len(metadata.reasons) else f"code {code}"
+
+
 class CUnit:
     """A compiled C library."""
 
@@ -84,10 +91,7 @@ class CUnit:
 
     def reason(self, code: int) -> str:
         """What a return code means."""
-        if code == NOT_FINITE:
-            return "the result is not finite"
-        reasons = self.metadata.reasons
-        return reasons[code - 1] if 0 < code <= len(reasons) else f"code {code}"
+        return reason_of(self.metadata, code)
 
     def evaluator(self, name: str) -> CEvaluator:
         return CEvaluator(self, name)
@@ -100,6 +104,23 @@ class CUnit:
         if not np.isfinite(c).all():
             raise EvaluationError(f"{self.metadata.name}: {np.count_nonzero(~np.isfinite(c))} of the constants that "
                                   "depend on parameters only are not finite; check for a division by a zero parameter")
+
+
+class KernelUnit:
+    """Text of a kernel that integrates many motions, which devices compile; it evaluates nothing by itself."""
+
+    backend = "c"
+
+    def __init__(self, source: str, metadata: Metadata) -> None:
+        self.source, self.metadata = source, metadata
+
+    def reason(self, code: int) -> str:
+        """What a return code means."""
+        return reason_of(self.metadata, code)
+
+    def evaluator(self, name: str) -> Evaluator:
+        """Raises EvaluationError."""
+        raise EvaluationError(f"{self.metadata.name}: {name} is asked of a kernel, which integrates motions only")
 
 
 class CEvaluator:

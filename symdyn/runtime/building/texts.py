@@ -9,7 +9,7 @@ from symdyn.backend.metadata import Metadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.functions.table import BATCH, seldom_called
 from symdyn.runtime.building.compiler import plain, require_compiler
-from symdyn.runtime.building.library import Unit, loaded
+from symdyn.runtime.building.library import KernelUnit, Unit, loaded
 
 
 class Texts:
@@ -37,6 +37,8 @@ class Texts:
     def load(self, what: str | RightSide) -> Unit:
         """The library that has it. Raises KeyError where no text does, and what compiling raises."""
         text, metadata = self._made[self._key(what)]
+        if isinstance(what, RightSide) and what.threads:
+            return KernelUnit(text, metadata)
         compiler = require_compiler() if self.backend == "c" else None
         if compiler is not None and isinstance(what, str) and seldom_called(what):
             compiler = plain(compiler)

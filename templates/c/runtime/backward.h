@@ -10,7 +10,7 @@
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_record)(
     void *memory, long max_steps, long n, double *t, double *h, double *x, double *slopes, long *written) {
     enum { WIDTH = SYMDYN_STAGES * SYMDYN_NX };
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     *written = 0;
     for (; max_steps > 0 && *written < n && run->status == SYMDYN_STEP_LIMIT; max_steps--) {
         const long before = run->n_steps;

@@ -171,7 +171,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_ba
 // stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
     const double *const *real, double *const *out, symdyn_report *reports) {
-    symdyn_batch *const batch = memory;
+    symdyn_batch *const batch = (symdyn_batch *)memory;
     batch->given = given;
     batch->n = counts[0];
     batch->n_out = counts[1];
@@ -189,7 +189,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *gi
 
 // At most so many steps in every lane; returns how many trajectories have ended.
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps) {
-    symdyn_batch *const batch = memory;
+    symdyn_batch *const batch = (symdyn_batch *)memory;
     for (; max_steps > 0 && batch->n_done < batch->n; max_steps--) symdyn_batch_attempt(batch);
     return batch->n_done;
 }

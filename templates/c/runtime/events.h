@@ -817,7 +817,7 @@ static int symdyn_resume(symdyn_run *run) {
 
 // Which of the SYMDYN_N_EVENTS events to look for, after the start, by samples no further apart than spacing, s (0: any).
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     run->events.spacing = spacing;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.looking |= run->events.look[k] = look[k];
 }
@@ -825,7 +825,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, d
 // Go on from the end of another run, after simulation_look: known: the sides of the quantities there, 0 where unknown, of those
 // that have just vanished the rates, NaN of all others, and what was left of them; reset: whether the state was changed since.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *known, int reset) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     const double *const sides = known, *const rates = known + SYMDYN_N_EVENTS, *const left = known + 2 * SYMDYN_N_EVENTS;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
         const int fired = run->events.fired[k] = rates[k] == rates[k];
@@ -839,7 +839,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *kno
 // The state after the events that have fired, where a run has just been started, for callers that look for events on their own:
 // the same resets, kept on the constraints. after: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, double *after) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.fired[k] = fired[k];
     return symdyn_event_reset(run, run->t, run->x, after);
 }
@@ -848,7 +848,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, 
 // too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
 // on, -1 - 2 SYMDYN_N_EVENTS - k for one of several at one time on whose order the columns depend. Returns how many.
 SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     const int n = run->events.n_noted;
     for (int k = 0; k < n * SYMDYN_NOTE; k++) rows[k] = run->events.noted[k];
     run->events.n_noted = 0;

@@ -6,6 +6,18 @@ double sinh(double), cosh(double), tanh(double), asinh(double), acosh(double), a
 double exp(double), exp2(double), log(double), log2(double), log1p(double), sqrt(double), pow(double, double), erf(double);
 double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(double, double);
 
+#if SYMDYN_THREADS
+#if defined(__CUDACC__)  // CUDA C is C++
+#define restrict __restrict__
+#define __builtin_fma fma
+#define __FMA__ 1
+// Right-hand sides would be compiled for minutes in each of twelve stages, and registers would not suffice.
+#define SYMDYN_APART __noinline__
+#else
+#define SYMDYN_APART
+#endif
+#endif
+
 // a*b + c, rounded once where the processor can.
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
 #define MADD(a, b, c) __builtin_fma(a, b, c)
@@ -18,7 +30,7 @@ double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(dou
 #else
 #define SYMDYN_EXPORT
 #endif
-#if !defined(__GNUC__)
+#if !defined(__GNUC__) && !defined(__CUDACC__)
 #define __attribute__(list)
 #endif
 

@@ -62,7 +62,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
         if (failure) return failure;
@@ -80,8 +80,8 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
 
 // What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
-    const symdyn_run *const run = memory;
-    *report = (symdyn_report){
+    const symdyn_run *const run = (const symdyn_run *)memory;
+    const symdyn_report now = {
         .status = run->status,
         .t = run->t,
         .h = run->h,
@@ -102,6 +102,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
         .n_jacobians = run->n_jacobians,
         .n_factorizations = run->n_factorizations,
     };
+    *report = now;
 #if SYMDYN_EVENTS
     report->reset_gap = run->events.reset_gap;
 #endif

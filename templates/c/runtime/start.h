@@ -84,10 +84,10 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
     void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
-    symdyn_run *const run = memory;
+    symdyn_run *const run = (symdyn_run *)memory;
     const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
     const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
-    static const symdyn_run empty;
+    static const symdyn_run empty = {0};
     int bad = !(length <= symdyn_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
     *run = empty;
     run->problem = *problem;

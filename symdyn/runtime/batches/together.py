@@ -1,0 +1,134 @@
+"""Motions that compiled code integrates together: what it reads and writes, and what has become of each of them."""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
+from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.batches.starts import consistent_starts, projects
+from symdyn.runtime.integrating.compiled import FAR, moved_far
+from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.stops import describe_stop
+from symdyn.runtime.masses import negative_masses
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+LISTED = 3
+
+
+@dataclass(frozen=True)
+class Asked:
+    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies."""
+
+    n: int
+    starts: np.ndarray
+    params: np.ndarray
+    inputs: np.ndarray
+    times: np.ndarray
+    span: tuple[float, float]
+    rtol: float
+    atol: np.ndarray
+    max_step: float
+    first_step: float
+
+
+class Together:
+    """Motions that are integrated together by compiled code, with its results.
+
+    x (n, n_t, n_x), reports (n,), states (n, 2, n_x)    what the code writes
+    starts, params, lengths   what it reads; not a number where a motion cannot begin, for which `wrong` has the reason
+    """
+
+    def __init__(self, module: Module, asked: Asked) -> None:
+        n, n_x = asked.n, module.metadata.sizes.x
+        self.module, self.asked = module, asked
+        self.x = np.full((n, len(asked.times), n_x), np.nan)
+        self.reports = np.zeros(n, dtype=np.dtype(RunReport))
+        self.reports["status"] = STATUS.STEP_LIMIT
+        self.states = np.full((n, 2, n_x), np.nan)
+        self.span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
+        self.params, self.wrong = _real(module, asked)
+        self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params, n)
+        self.wrong |= astray
+        self.begun = clock.perf_counter()
+
+    def solution(self, unit: Any, width: int, note: str, interrupted: bool, limit: int,
+                 alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
+        """What has come of them; those that took more than `limit` steps, or left their constraints, are integrated alone.
+
+        Raises SimulationInterrupted where that was interrupted.
+        """
+        module, reports, x, n = self.module, self.reports, self.x, self.asked.n
+        success, counts, late = reports["status"] == STATUS.DONE, _counts(reports), reports["status"] == STATUS.STEP_LIMIT
+        messages = {k: self.wrong.get(k) or _message(unit, reports[k], self.states[k]) for k in np.flatnonzero(~success).tolist()}
+        if late.any() and not interrupted:
+            why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
+                   "their steps may have become too short")
+            note = f"{late.sum()} of {n} motions one by one: they took more than {limit} steps, and {why}"
+        moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
+        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
+        if projects(module):  # what keeps a state from the constraints, a run of its own finds out
+            late |= ~success
+            late[list(self.wrong)] = False
+        if late.any() and not interrupted:
+            again = np.flatnonzero(late)
+            single = alone(again)
+            x[again], success[again] = single.x, single.success
+            counts[again] = np.column_stack([single.n_steps, single.n_rejected])
+            messages = {k: message for k, message in messages.items() if not late[k]}
+            messages |= {int(again[k]): message for k, message in single.messages.items()}
+        solution = BatchSolution(module.metadata, self.asked.times, x, success, dict(sorted(messages.items())), counts[:, 0],
+                                 counts[:, 1], width, note, clock.perf_counter() - self.begun)
+        if interrupted:
+            raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
+        return solution
+
+
+def _real(module: Module, asked: Asked) -> tuple[np.ndarray, dict[int, str]]:
+    """The parameters, NaN in rows with masses that no body has, and what to say of these."""
+    wrong = negative_masses(module, asked.params)
+    if not wrong:
+        return asked.params, wrong
+    if len(asked.params) == 1:
+        raise ArgumentError(wrong[0])
+    params = asked.params.copy()
+    params[list(wrong)] = np.nan
+    return params, wrong
+
+
+def _counts(reports: np.ndarray) -> np.ndarray:
+    """Accepted steps and attempts given up, (n, 2)."""
+    return np.column_stack([reports["n_steps"], reports["n_rejected"]])
+
+
+def _message(unit: Any, row: np.ndarray, states: np.ndarray) -> str:
+    of, metadata = RunReport.from_buffer_copy(row.tobytes()), unit.metadata
+    if of.status == STATUS.STEP_LIMIT:
+        return f"{metadata.name}: not finished"
+    reason, bad = unit.reason(of.reason), of.bad_index
+    if of.status == STATUS.NO_CONSTANTS:
+        return f"{metadata.name}: {reason}; check the parameters"
+    failed = of.status in (STATUS.FIELD_FAILED, STATUS.STATE_NOT_FINITE)
+    x = states[int(failed)]
+    if of.status == STATUS.BAD_ARGUMENT:
+        wrong = [name for name, value in zip(metadata.x, x, strict=True) if not np.isfinite(value)]
+        return f"{metadata.name}: the start is not finite: {', '.join(wrong)}"
+    why = {STATUS.FIELD_FAILED: reason, STATUS.STEP_TOO_SMALL: f"the step became too small ({of.h:.3g} s) for the tolerances",
+           STATUS.STATE_NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
+    return describe_stop(metadata, of.t_fail if failed else of.t, x,
+                         why.get(of.status, f"the integrator does not go on (status {of.status})"))
+
+
+def warn(doubts: Sequence[str], n: int) -> None:
+    """Warns of some of n motions, if there are any."""
+    if doubts:
+        more = f"; and {len(doubts) - LISTED} more" if len(doubts) > LISTED else ""
+        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=5)

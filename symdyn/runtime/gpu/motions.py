@@ -1,0 +1,178 @@
+"""Integrates many motions on a device: a thread each, in chunks that fit into its memory, copied while others are computed."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from symdyn.backend.c_records import fields_of
+from symdyn.errors import ArgumentError
+from symdyn.runtime.batches.states import Table
+from symdyn.runtime.gpu.device import Device
+from symdyn.runtime.inputs.tables import Pieces
+from symdyn.runtime.memory import in_bytes
+
+# Of the memory that is free so much is taken, by two chunks at a time.
+SHARE, SLOTS = 0.8, 2
+# A chunk has so many motions for every thread that the device holds, unless all of them are fewer, so that threads that are
+# through find a further motion.
+ROUNDS = 4
+# Attempted steps of a motion, at most: a kernel cannot be interrupted. What takes more goes on on the processor.
+MOST_STEPS = 1_000_000
+ALIGNED = 256
+
+
+class Motions(ctypes.Structure):
+    """What a kernel computes motions from and where it writes them; see c/runtime/motions_type.h."""
+
+    _fields_ = fields_of("runtime/motions_type.h")
+
+
+@dataclass
+class Work:
+    """Motions to integrate, and where their results go.
+
+    starts, inputs, params, lengths   rows of motions, one row for all where nothing varies
+    span       t0, t_end, rtol, first step, largest step
+    project    whether states are kept on what holds for them
+    pieces, stops   inputs over time, and instants that steps end at
+    x, states, reports   results of n motions
+    """
+
+    starts: np.ndarray
+    inputs: np.ndarray
+    params: np.ndarray
+    lengths: np.ndarray
+    span: np.ndarray
+    atol: np.ndarray
+    times: np.ndarray
+    project: bool
+    pieces: Pieces | None
+    stops: np.ndarray
+    x: np.ndarray
+    states: np.ndarray
+    reports: np.ndarray
+
+    @property
+    def given(self) -> tuple[np.ndarray, ...]:
+        """In the order of the kernel."""
+        return self.starts, self.inputs, self.params, self.lengths
+
+    @property
+    def results(self) -> tuple[np.ndarray, ...]:
+        """What the kernel writes."""
+        return self.x, self.states, self.reports
+
+    def bytes_each(self) -> int:
+        """What one motion takes of the device's memory."""
+        varying = sum(a.shape[1] * a.itemsize for a in self.given if len(a) > 1)
+        return varying + sum(a[:1].nbytes for a in self.results)
+
+
+@dataclass
+class _Slot:
+    """Memory of the device for one chunk, with its stream."""
+
+    stream: Any
+    given: list[int]
+    results: list[int]
+    tables: int
+    counter: int
+    rows: range | None = None
+    kept: list[np.ndarray] = field(default_factory=list)
+
+
+def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
+    """Fill the results of some motions; returns what it took of the device, in words.
+
+    kernel   the function `motions` of the mechanism on that device
+    Raises ArgumentError where not even a few motions fit into the memory. After a KeyboardInterrupt what is under way is waited
+    for; chunks that were not begun keep their results as they were.
+    """
+    n, threads = len(work.x), device.at_once(kernel)
+    fixed = [np.ascontiguousarray(a, dtype=float) for a in (
+        work.span, work.atol, work.times, work.stops,
+        *((work.pieces.breaks, work.pieces.coefficients) if work.pieces is not None else (np.zeros(0), np.zeros(0))))]
+    # One row for all is copied once a slot.
+    around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
+    free = device.free()
+    most = (int(SHARE * free) - around) // SLOTS // work.bytes_each()
+    if most < 1:
+        raise ArgumentError(f"{owner}: {device.name} has {in_bytes(free)} of free memory, of which two motions with "
+                            f"{len(work.times)} output times take {in_bytes(SLOTS * work.bytes_each() + around)}; ask for fewer "
+                            "output times")
+    size = max(1, min(n, most, max(ROUNDS * threads, -(-n // (4 * SLOTS)))))
+    taken: list[int] = []
+
+    def allocated(nbytes: int) -> int:
+        taken.append(device.allocate(max(nbytes, ALIGNED)))
+        return taken[-1]
+
+    try:
+        places = [allocated(a.nbytes) for a in fixed]
+        slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * a.itemsize) for a in work.given],
+                       [allocated(size * a[:1].nbytes) for a in work.results],
+                       allocated(len(work.given) * ctypes.sizeof(Table)), allocated(ctypes.sizeof(ctypes.c_int)))
+                 for _ in range(min(SLOTS, -(-n // size)))]
+        for place, values in zip(places, fixed, strict=True):
+            device.upload(slots[0].stream, place, values)
+        device.wait(slots[0].stream)  # the other stream would not
+        _chunks(device, kernel, work, slots, places, _parts(n, size), threads)
+    finally:
+        for address in taken:
+            device.release(address)
+    return f"on {device.name}, {min(threads, size)} at once, {in_bytes(SLOTS * size * work.bytes_each() + around)} of its memory"
+
+
+def _parts(n: int, size: int) -> Iterator[range]:
+    return (range(first, min(first + size, n)) for first in range(0, n, size))
+
+
+def _chunks(device: Device, kernel: Any, work: Work, slots: list[_Slot], places: list[int], parts: Iterator[range],
+            threads: int) -> None:
+    """One chunk after the other: while one is computed, the one before is copied back and the next one is brought."""
+    try:
+        for k, rows in enumerate(parts):
+            slot = slots[k % len(slots)]
+            _collect(device, work, slot)
+            _begin(device, kernel, work, slot, places, rows, threads)
+    finally:
+        for slot in sorted(slots, key=lambda s: s.rows.start if s.rows else 0):
+            _collect(device, work, slot)
+
+
+def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[int], rows: range, threads: int) -> None:
+    part, n = slice(rows.start, rows.stop), len(rows)
+    tables = (Table * len(work.given))()
+    slot.kept = []
+    for k, (values, address) in enumerate(zip(work.given, slot.given, strict=True)):
+        mine = np.ascontiguousarray(values[part] if len(values) > 1 else values, dtype=float)
+        tables[k] = Table(address, mine.shape[1] if len(values) > 1 else 0, 1)
+        device.upload(slot.stream, address, mine)
+        slot.kept.append(mine)
+    headers = np.frombuffer(bytes(tables), dtype=np.uint8)
+    for values, address in ((headers, slot.tables), (np.zeros(1, dtype=np.intc), slot.counter)):
+        device.upload(slot.stream, address, values)
+        slot.kept.append(values)
+    span, atol, times, stops, breaks, coefficients = places
+    argument = Motions(
+        n=n, n_out=len(work.times), max_steps=MOST_STEPS, given=slot.tables, span=span, atol=atol, t_out=times,
+        n_pieces=0 if work.pieces is None else len(work.pieces.coefficients), breaks=breaks, pieces=coefficients,
+        n_stops=len(work.stops), stops=stops, project=int(work.project), x_out=slot.results[0], states=slot.results[1],
+        reports=slot.results[2], next=slot.counter)
+    device.launch(slot.stream, kernel, min(threads, n), argument)
+    slot.rows = rows
+
+
+def _collect(device: Device, work: Work, slot: _Slot) -> None:
+    """Copy the results of a chunk back, when they are there."""
+    if slot.rows is None:
+        return
+    part, slot.rows = slice(slot.rows.start, slot.rows.stop), None
+    for values, address in zip(work.results, slot.results, strict=True):
+        device.download(slot.stream, values[part], address)
+    device.wait(slot.stream)

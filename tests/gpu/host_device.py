@@ -1,0 +1,83 @@
+"""A device that computes on the processor: the text of a kernel, compiled as C, with memory and streams as a GPU has them."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from symdyn.runtime.building import cache
+from symdyn.runtime.building.compiler import require_compiler
+
+
+class HostDevice:
+    """Memory are buffers of this process. What a stream is given is done when it is waited for, as late as a GPU may do it.
+
+    memory    bytes that there are; threads: that are held at once
+    log       what was done: ("begin", n), ("end", n) of kernels, ("up", bytes), ("down", bytes)
+    """
+
+    name = "a processor"
+
+    def __init__(self, memory: int = 2**30, threads: int = 256) -> None:
+        self.memory, self.threads = memory, threads
+        self.blocks: dict[int, Any] = {}
+        self.log: list[tuple[str, int]] = []
+        self.most = 0
+        self.closed = False
+
+    def free(self) -> int:
+        return self.memory - sum(ctypes.sizeof(b) for b in self.blocks.values())
+
+    def kernel(self, text: str, name: str, function: str) -> Any:
+        return getattr(cache.load(text, name, require_compiler()), function)
+
+    def at_once(self, kernel: Any) -> int:
+        return self.threads
+
+    def allocate(self, size: int) -> int:
+        assert size <= self.free(), "more than the device has"
+        block = ctypes.create_string_buffer(size)
+        self.blocks[ctypes.addressof(block)] = block
+        self.most = max(self.most, sum(ctypes.sizeof(b) for b in self.blocks.values()))
+        return ctypes.addressof(block)
+
+    def release(self, address: int) -> None:
+        del self.blocks[address]
+
+    def stream(self) -> list[Any]:
+        return []
+
+    def upload(self, stream: list[Any], address: int, values: np.ndarray) -> None:
+        self._inside(address, values.nbytes)
+        stream.append(lambda: self._copy("up", address, values.ctypes.data, values.nbytes))
+
+    def download(self, stream: list[Any], values: np.ndarray, address: int) -> None:
+        self._inside(address, values.nbytes)
+        assert values.flags.c_contiguous
+        stream.append(lambda: self._copy("down", values.ctypes.data, address, values.nbytes))
+
+    def launch(self, stream: list[Any], kernel: Any, threads: int, argument: Any) -> None:
+        copied = type(argument).from_buffer_copy(argument)  # as a driver copies it
+        self.log.append(("begin", argument.n))
+        stream.append(lambda: self._run(kernel, copied))
+
+    def wait(self, stream: list[Any]) -> None:
+        while stream:
+            stream.pop(0)()
+
+    def close(self) -> None:
+        self.closed = True
+
+    def _copy(self, way: str, to: int, source: int, size: int) -> None:
+        ctypes.memmove(to, source, size)
+        self.log.append((way, size))
+
+    def _run(self, kernel: Any, argument: Any) -> None:
+        kernel(argument)
+        self.log.append(("end", argument.n))
+
+    def _inside(self, address: int, size: int) -> None:
+        """What is copied lies within one block."""
+        assert any(start <= address and address + size <= start + ctypes.sizeof(block) for start, block in self.blocks.items())

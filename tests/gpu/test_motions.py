@@ -1,0 +1,295 @@
+"""Motions on a device: the kernel's text as C on a device of this processor, against those of simulate_batch, and as machine code
+of a GPU; the driver's calls on a driver that computes on this processor."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from host_device import HostDevice
+
+import symdyn as sd
+from symdyn.backend.right_side import RightSide
+from symdyn.ensembles.sweep_file import read_sweep
+from symdyn.errors import ArgumentError, CompileError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.runtime.batches import on_device
+from symdyn.runtime.building import cache
+from symdyn.runtime.building.compiler import require_compiler
+from symdyn.runtime.gpu import compiling, device
+from symdyn.runtime.gpu.motions import Motions
+
+HERE = Path(__file__).parent
+
+
+@functools.cache
+def compiled(name: str) -> Any:
+    return sd.systems.get(name).compile(backend="c")
+
+
+@pytest.fixture
+def host(monkeypatch: pytest.MonkeyPatch) -> HostDevice:
+    """What stands for every GPU."""
+    made = HostDevice(threads=8)
+    monkeypatch.setattr(device, "open_device", lambda number, owner: made)
+    return made
+
+
+def swings(n: int) -> dict[str, Any]:
+    """Motions of different lengths of a double pendulum."""
+    rng = np.random.default_rng(3)
+    return {"q": {"q1": rng.uniform(-2, 2, n), "q2": 0.2}, "params": {"m2": rng.uniform(0.5, 3, n)}}
+
+
+def same(a: Any, b: Any) -> None:
+    """Two batches of motions agree to the last bit, steps included."""
+    assert np.array_equal(a.x, b.x, equal_nan=True)
+    assert np.array_equal(a.n_steps, b.n_steps) and np.array_equal(a.n_rejected, b.n_rejected)
+    assert np.array_equal(a.success, b.success)
+
+
+# -- against the processor
+
+
+@pytest.mark.parametrize("t", [(0, 2), [0, 0.5, 0.7, 2]])
+def test_motions_are_those_of_the_processor(host: HostDevice, t: Any) -> None:
+    module, asked = compiled("double_pendulum"), swings(100)
+    there = module.simulate_batch(**asked, t=t, device="gpu")
+    same(there, module.simulate_batch(**asked, t=t))
+    assert there.width == 8 and "a processor, 8 at once" in there.note
+    assert host.closed and not host.blocks
+
+
+def test_chunks_are_begun_before_the_ones_before_are_copied_back(host: HostDevice) -> None:
+    compiled("double_pendulum").simulate_batch(**swings(200), t=(0, 1), device="gpu")
+    works = [what for what in host.log if what[0] in ("begin", "end")]
+    assert [n for what, n in works if what == "begin"] == [32] * 6 + [8]
+    # Two are under way at any time, but for the first and the last one.
+    under_way = np.cumsum([1 if what == "begin" else -1 for what, _ in works])
+    assert under_way.max() == 2 and (under_way[1:-1] >= 1).all() and under_way[-1] == 0
+
+
+def test_memory_of_the_device_is_bounded(host: HostDevice) -> None:
+    module, asked = compiled("double_pendulum"), swings(300)
+    host.memory = 60_000
+    there = module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
+    same(there, module.simulate_batch(**asked, t=np.linspace(0, 1, 11)))
+    assert 0.5 * host.memory < host.most <= 0.8 * host.memory
+    host.memory = 3_000
+    with pytest.raises(ArgumentError, match=r"a processor has 3 kB \(3000 bytes\) of free memory, of which two motions with 11"):
+        module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
+
+
+@pytest.mark.parametrize("name", ["four_bar", "rolling_disc", "floating_crane"])
+def test_constrained_and_floating_mechanisms(host: HostDevice, name: str) -> None:
+    module = compiled(name)
+    rng, names = np.random.default_rng(1), module.metadata.parameters
+    masses = [n for n in names if n.startswith("m")][:1]
+    params = {n: module.default_parameters[names.index(n)] * rng.uniform(1, 1.2, 5) for n in masses}
+    asked: dict[str, Any] = {"params": params} if params else {"u": {module.metadata.u[-1]: rng.uniform(0, 0.01, 5)}}
+    asked["t"] = (0, 0.3)
+    events = {"events": False} if module.metadata.events else {}
+    there, here = module.simulate_batch(**asked, **events, device="gpu"), module.simulate_batch(**asked, **events)
+    assert here.success.all() and there.success.all()
+    assert np.abs(there.x - here.x).max() <= 1e-12 * np.abs(here.x).max()
+    assert np.array_equal(there.n_steps, here.n_steps)
+
+
+def test_other_pairs_and_inputs_by_tables(host: HostDevice) -> None:
+    module = compiled("cart_pole")
+    name = module.metadata.inputs[0]
+    table = ([0.0, 0.4, 1.0], [0.0, 3.0, -2.0])
+    angles = {module.metadata.q[1]: np.linspace(0.1, 1, 7)}
+    asked: dict[str, Any] = {"q": angles, "inputs": {name: table}, "t": np.linspace(0, 1, 5)}
+    there, here = module.simulate_batch(**asked, device="gpu"), module.simulate_batch(**asked)
+    same(there, here)
+    by_bs54 = module.simulate_batch(**asked, method="bs54", device="gpu")
+    same(by_bs54, module.simulate_batch(**asked, method="bs54"))
+    assert not np.array_equal(by_bs54.n_steps, there.n_steps)
+
+
+def test_what_fails_is_reported_and_the_others_run_on(host: HostDevice) -> None:
+    module = compiled("double_pendulum")
+    asked: dict[str, Any] = {"q": {"q1": [0.1, np.nan, 0.3, 0.2]}, "params": {"m2": [1.0, 1.0, -1.0, 2.0]}, "t": [0, 1, 2]}
+    with pytest.warns(SimulationWarning, match="2 of 4 motions failed: 1: .*start is not finite: q1; 2: .*m2"):
+        there = module.simulate_batch(**asked, device="gpu")
+    with pytest.warns(SimulationWarning, match="2 of 4 motions failed"):
+        here = module.simulate_batch(**asked)
+    same(there, here)
+    assert there.messages == here.messages and np.isnan(there.x[1:3]).all()
+
+
+@pytest.fixture(scope="module")
+def burst() -> Any:
+    """A force that grows beyond all bounds at t = 1/k."""
+    x: Any = sd.coordinates("x")
+    k, m = sd.parameters("k m")
+    system = sd.System("burst")
+    joint = system.add_joint(sd.Prismatic("j", system.ground, system.add_body("b", mass=m), x, axis=[1, 0, 0]))
+    system.add_joint_force(joint, 1 / (1 - k * sd.t) ** 2)
+    system.defaults = {k: 1, m: 1}
+    return system.embedding().compile(backend="c")
+
+
+def test_motions_that_stop_early_keep_what_they_reached(host: HostDevice, burst: Any) -> None:
+    asked: dict[str, Any] = {"params": {"k": [0.1, 2.0, 0.2], "m": [1.0, 1.0, 0.0]}, "t": [0, 0.25, 0.4, 1]}
+    with pytest.warns(SimulationWarning, match="2 of 3 motions failed: 1: .*the step became too small"):
+        there = burst.simulate_batch(**asked, device="gpu")
+    with pytest.warns(SimulationWarning, match="2 of 3 motions failed"):
+        here = burst.simulate_batch(**asked)
+    same(there, here)
+    assert there.messages == here.messages and np.isfinite(there.x[1, :3]).all() and np.isnan(there.x[1, 3]).all()
+
+
+def test_euler_parameters_keep_their_length(host: HostDevice) -> None:
+    system = sd.System("top", gravity=[0, 0, -9.81])
+    body = system.add_body("b", mass=1, inertia=[0.2, 0.3, 0.4])
+    system.add_joint(sd.Spherical("s", system.ground, body, orientation=sd.EulerParameters(), child_point=[0, 0, 1]))
+    module = system.embedding().compile(backend="c")
+    asked: dict[str, Any] = {"u": {module.metadata.u[2]: np.linspace(1, 20, 6)}, "t": (0, 3)}
+    there = module.simulate_batch(**asked, device="gpu")
+    same(there, module.simulate_batch(**asked))
+    assert np.abs(np.sum(there.q[:, -1] ** 2, axis=1) - 1).max() < 1e-15
+
+
+def test_long_motions_go_on_on_the_processor(host: HostDevice, monkeypatch: pytest.MonkeyPatch) -> None:
+    from symdyn.runtime.gpu import motions
+
+    monkeypatch.setattr(motions, "MOST_STEPS", 20)
+    module, asked = compiled("double_pendulum"), swings(12)
+    there, here = module.simulate_batch(**asked, t=(0, 2), device="gpu"), module.simulate_batch(**asked, t=(0, 2))
+    same(there, here)
+    assert "motions one by one: they took more than" in there.note
+
+
+def test_an_interrupt_keeps_what_is_done(host: HostDevice, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = host.launch
+    count = iter(range(10))
+
+    def launch(*arguments: Any) -> None:
+        if next(count) == 3:
+            raise KeyboardInterrupt
+        begun(*arguments)
+
+    monkeypatch.setattr(host, "launch", launch)
+    with pytest.raises(SimulationInterrupted, match="interrupted after 96 of 200 motions") as caught:
+        compiled("double_pendulum").simulate_batch(**swings(200), t=(0, 1), device="gpu")
+    solution: Any = caught.value.solution
+    assert solution.success.sum() == 96 and host.closed and not host.blocks
+
+
+def test_ensembles_and_sweep_files(host: HostDevice, tmp_path: Path) -> None:
+    module = compiled("double_pendulum")
+    drawn = sd.Samples({"q1": {"from": -1, "to": 1}}, count=64, seed=2)
+    on_gpu = sd.ensemble(module, drawn, (0, 1), ["end q1", "max q2", "mean energy"], device="gpu")
+    here = sd.ensemble(module, drawn, (0, 1), ["end q1", "max q2", "mean energy"])
+    for label in ("end q1", "max q2", "mean energy"):
+        assert np.array_equal(on_gpu[label], here[label])
+    assert host.log
+    file = tmp_path / "swings.toml"
+    file.write_text('system = "double_pendulum"\ndevice = "gpu:1"\n[initial]\nq1 = [0.1, 0.2]\n')
+    faults: list[str] = []
+    assert read_sweep(file, faults).arguments(module)["device"] == "gpu:1" and not faults
+
+
+# -- what a device does not take
+
+
+def test_bad_devices() -> None:
+    module = compiled("double_pendulum")
+    wrong: Any
+    for wrong in ("cuda", "gpu:", "gpu:-1", 0, "gpu:x"):
+        with pytest.raises(ArgumentError, match="device must be 'cpu', 'gpu', or 'gpu:1' for the second one, found"):
+            module.simulate_batch(t=(0, 1), device=wrong)
+        with pytest.raises(ArgumentError, match="device must be"):
+            sd.ensemble(module, {"q1": [0.1]}, (0, 1), device=wrong)
+
+
+@pytest.mark.skipif(shutil.which("nvidia-smi") is not None, reason="there may be a GPU")
+def test_no_gpu() -> None:
+    for ask in (lambda: compiled("double_pendulum").simulate_batch(t=(0, 1), device="gpu"),
+                lambda: sd.ensemble(compiled("double_pendulum"), {"q1": [0.1]}, (0, 1), device="gpu")):
+        with pytest.raises(ArgumentError, match=r"device='gpu' was asked for, but this machine has no CUDA device that answers "
+                                                r"\(.*\); leave device out to compute on the processor"):
+            ask()
+
+
+def test_all_that_a_kernel_does_not_do_is_said_at_once(host: HostDevice) -> None:
+    module = compiled("double_pendulum")
+    with pytest.raises(ArgumentError, match=r"does not take these motions: method='radau'; kernels integrate by 'dop853' or "
+                                            r"'bs54'; max_steps, sensitivities: kernels have none of these\. Leave device out"):
+        module.simulate_batch(t=(0, 1), device="gpu", method="radau", max_steps=10, sensitivities=["m2"])
+    with pytest.raises(ArgumentError, match="inputs by functions of Python or controllers; give tables, splines or numbers"):
+        driven = compiled("cart_pole")
+        driven.simulate_batch(t=(0, 1), inputs={driven.metadata.inputs[0]: lambda t, x: 0.0}, device="gpu")
+    with pytest.raises(ArgumentError, match="the backend of the module is numpy; kernels are made of its C"):
+        sd.systems.pendulum().compile(backend="numpy").simulate_batch(t=(0, 1), device="gpu")
+    with pytest.raises(ArgumentError, match="takes starts as they are; leave consistent out"):
+        sd.ensemble(module, {"q1": [0.1]}, (0, 1), device="gpu", consistent=True)
+    assert on_device.METHODS == ("dop853", "bs54")
+
+
+def test_missing_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cuda.bindings", None)
+    with pytest.raises(MissingExtra, match=r"device='gpu' needs the package cuda-bindings: pip install 'symdyn\[gpu\]'"):
+        compiled("double_pendulum").simulate_batch(t=(0, 1), device="gpu")
+    with pytest.raises(MissingExtra, match="needs the packages cuda-bindings and nvidia-cuda-nvrtc"):
+        compiling.nvrtc()
+
+
+# -- as code of a GPU
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "four_bar", "floating_crane"])
+def test_kernels_compile_for_a_gpu(name: str) -> None:
+    pytest.importorskip("cuda.bindings")
+    unit: Any = compiled(name).unit(RightSide(threads=True))
+    code = compiling.ptx(unit.source, name, "compute_90").decode()
+    assert f".entry {unit.metadata.name}_motions(" in code and "fma.rn.f64" in code
+
+
+def test_what_is_no_cuda_is_reported_with_the_compilers_words() -> None:
+    pytest.importorskip("cuda.bindings")
+    with pytest.raises(CompileError, match=r"(?s)kernel of 'odd' does not compile for compute_90 .*\"there\" is undefined"):
+        compiling.ptx("int f() { return there; }", "odd", "compute_90")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the driver of this test is a library of Linux")
+def test_the_drivers_calls(tmp_path: Path) -> None:
+    """A driver whose memory and kernels are this processor's stands in for CUDA's; machine code of a GPU is loaded, C is run."""
+    pytest.importorskip("cuda.bindings")
+    module = compiled("double_pendulum")
+    unit: Any = module.unit(RightSide(threads=True))
+    compiling.cubin(unit.source, module.name, "sm_90")  # kept in the cache: the compiler looks for a driver, too
+    driver = tmp_path / "libcuda.so.1"
+    subprocess.run([*require_compiler().command, "-shared", "-fPIC", f"-DSIZE={ctypes.sizeof(Motions)}", "-o", str(driver),
+                    str(HERE / "fake_driver.c"), "-ldl"], check=True)
+    program = """
+import ctypes, numpy as np, symdyn as sd
+module = sd.systems.get("double_pendulum").compile(backend="c")
+asked = {"q": {"q1": np.linspace(-1, 1, 9000), "q2": 0.2}, "t": (0, 0.1)}
+there, here = module.simulate_batch(**asked, device="gpu"), module.simulate_batch(**asked)
+assert np.array_equal(there.x, here.x) and there.success.all()
+print(there.note)
+counts = (ctypes.c_longlong * 4)()
+ctypes.CDLL("libcuda.so.1").fake_counts(counts)
+print(*counts)
+try:
+    module.simulate_batch(**asked, device="gpu:1")
+except sd.ArgumentError as error:
+    print(error)
+"""
+    environment = {**os.environ, "LD_LIBRARY_PATH": str(tmp_path),
+                   "FAKE_KERNELS": str(cache.build(unit.source, module.name, require_compiler()))}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    note, counts, error = done.stdout.splitlines()
+    assert note.startswith("on Fake 0, 4096 at once, ") and not done.stderr
+    assert counts == "0 0 0 1"  # blocks, modules and streams are given back; one kernel ran
+    assert error == "double_pendulum: device='gpu:1' was asked for; there are 1, numbered from 0"
