@@ -41,7 +41,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     module = _checked(arguments, asked, faults)
     folder = arguments.output or asked.folder or Path("generated") / arguments.file.stem
     begun = clock.perf_counter()
-    with _executor(arguments, module) as executor:
+    with _executor(arguments, module, asked.values.get("device", "cpu")) as executor:
         try:
             done = ensemble(module, **asked.arguments(module), path=folder, resume=arguments.resume, executor=executor,
                             progress=arguments.progress)
@@ -121,9 +121,9 @@ def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
 
 
 @contextlib.contextmanager
-def _executor(arguments: argparse.Namespace, module: Module) -> Iterator[Any]:
+def _executor(arguments: argparse.Namespace, module: Module, device: str) -> Iterator[Any]:
     """What --jobs and --dask name: a cluster; threads where code is compiled, else processes, which do not wait
-    for each other."""
+    for each other; one thread where a GPU computes."""
     if arguments.dask is not None:
         try:
             from distributed import Client
@@ -139,7 +139,7 @@ def _executor(arguments: argparse.Namespace, module: Module) -> Iterator[Any]:
     from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
     from multiprocessing import get_context
 
-    jobs = arguments.jobs or os.cpu_count() or 1
+    jobs = arguments.jobs or (1 if device != "cpu" else os.cpu_count() or 1)
     if module.backend == "c" or jobs == 1:
         yield lambda: ThreadPoolExecutor(jobs)
     else:

@@ -18,6 +18,7 @@ from host_device import HostDevice
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
+from symdyn.cli import main
 from symdyn.ensembles.sweep_file import read_sweep
 from symdyn.errors import ArgumentError, CompileError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.batches import on_device
@@ -234,6 +235,14 @@ def test_all_that_a_kernel_does_not_do_is_said_at_once(host: HostDevice) -> None
     with pytest.raises(ArgumentError, match="takes starts as they are; leave consistent out"):
         sd.ensemble(module, {"q1": [0.1]}, (0, 1), device="gpu", consistent=True)
     assert on_device.METHODS == ("dop853", "bs54")
+
+
+def test_a_sweep_from_the_command_line(host: HostDevice, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "swings.toml"
+    file.write_text('system = "double_pendulum"\ndevice = "gpu"\nt = [0, 0.5]\noutcomes = ["end q1"]\n'
+                    '[initial]\nq1 = [0.1, 0.2]\n')
+    assert main(["sweep", str(file), "--no-picture", "--output", str(tmp_path / "out"), "--backend", "c"]) == 0
+    assert "double_pendulum: 2 samples of q1" in capsys.readouterr().out and host.log
 
 
 def test_missing_packages(monkeypatch: pytest.MonkeyPatch) -> None:
