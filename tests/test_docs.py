@@ -1,8 +1,11 @@
 """What the pages under docs show is what happens."""
 
+import ast
 import re
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -50,3 +53,34 @@ def test_the_index_lists_every_page() -> None:
     listed = set(re.findall(r"\]\(([\w/]+)\.(?:md|rst)\)", (ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
     reference = {f"reference/{page.stem}" for page in (ROOT / "docs" / "reference").glob("*.rst")}
     assert listed == set(NAMES.values()) - {"index", *OF_THE_PROJECT} | reference
+
+
+def texts_of(module: Path) -> Iterator[str]:
+    """The texts in a module's code, values within them as "..."."""
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "..." for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def unknown_messages(page: str, texts: list[str]) -> list[str]:
+    """Those in the first column of a page's tables that no text has with all of their parts between "..."."""
+    quoted = [message for row in re.findall(r"^\| (`.+?`) \|", page, re.MULTILINE) for message in re.findall("`([^`]+)`", row)]
+    assert quoted
+    parts = {message: [part for piece in message.split("...") if (part := piece.strip(" ;:,."))] for message in quoted}
+    return [message for message, needed in parts.items() if not any(all(part in text for part in needed) for text in texts)]
+
+
+def test_messages_are_those_of_the_code() -> None:
+    texts = [text for module in sorted((ROOT / "symdyn").rglob("*.py")) for text in texts_of(module)]
+    page = (ROOT / "docs" / "messages.md").read_text(encoding="utf-8")
+    assert unknown_messages(page, texts) == []
+    assert unknown_messages("| `the sky ... is green` | x |\n| `a joint ... is` | y |", ["a joint x is"]) == ["the sky ... is green"]
+
+
+def test_every_extra_is_on_the_page_of_installation() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    rows = "".join(re.findall(r"^\| (`.+?) \|", page, re.MULTILINE))
+    assert {name for name in extras if f"`{name}`" not in rows} == set()
