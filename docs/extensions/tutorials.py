@@ -47,7 +47,8 @@ def page_of(source: Path) -> str:
     parts = []
     for cell in jupytext.read(source).cells:
         if cell.cell_type == "markdown":
-            parts.append(cell.source.replace("](../docs/", "](../"))
+            text = cell.source.replace("](../docs/", "](../")
+            parts.append(re.sub(r"\]\((\w+)\.ipynb\)", rf"](\1{ENDING})", text))
             continue
         parts.append(f"```python\n{cell.source}\n```")
         parts += [block_of(output) for output in shown.get(digest(cell.source), ())]
