@@ -34,7 +34,7 @@ folder = Path(tempfile.mkdtemp())
 # %% [markdown]
 # ## 1. One motion
 #
-# Both rods hang down at $q_1 = -\pi/2$, $q_2 = 0$. What is kept of a motion is a few numbers; here the extremes of the
+# Both rods hang down at $q_1 = -\pi/2$, $q_2 = 0$. Only a few numbers of each motion are kept, here the extremes of the
 # second angle.
 
 # %%

@@ -29,7 +29,7 @@ rotation = sd.rotation
 # %% [markdown]
 # ## 1. The moment equation, particle by particle
 #
-# A body with two particles moves and turns in any way. What every particle needs about the point $O$, added up,
+# A body with two particles moves and turns in any way. The sum of the moments that the particles need about the point $O$,
 # $\sum \mathbf r_{i/O} \times m_i \ddot{\mathbf r}_{i/E}$, is the lecture's moment equation:
 #
 # $$\mathbf M_O = m\, \mathbf r_{G/O} \times \ddot{\mathbf r}_{O/E} + \boldsymbol\omega \times \mathbf I_O \boldsymbol\omega

@@ -71,7 +71,7 @@ comparison = sd.compare("pendulum-augmented")
 display(comparison)
 
 # %% [markdown]
-# What the missing term does: both right-hand sides are integrated from rest, with the rod horizontal. It is the centripetal
+# The effect of the missing term: both right-hand sides are integrated from rest, with the rod horizontal. It is the centripetal
 # acceleration that keeps the mass on its circle.
 
 # %%
@@ -101,7 +101,7 @@ plt.show()
 # %% [markdown]
 # ### The tension
 #
-# The slides of chapter 3.4 take $m g \cos q_1$ for the tension, the part of the weight along the wire. That holds at rest. In
+# The slides of chapter 3.4 take $m g \cos q_1$ for the tension, the part of the weight along the wire. This holds at rest. In
 # motion the wire pulls the mass around the curve as well. Released with the rod horizontal, it carries $3 m g$ at the bottom,
 # three times what the slide says.
 

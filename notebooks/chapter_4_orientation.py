@@ -133,7 +133,7 @@ plt.show()
 
 # %% [markdown]
 # Small rotations do commute, to first order: $\mathbf R \approx \mathbf 1 + \tilde{\boldsymbol\delta}$, and the small vectors
-# $\boldsymbol\delta$ add. What is left falls with the square of the angle. That is why angular velocities can be added and
+# $\boldsymbol\delta$ add. The remainder falls with the square of the angle. Therefore angular velocities can be added and
 # angles cannot.
 
 # %%

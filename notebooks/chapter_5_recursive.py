@@ -185,7 +185,7 @@ display(chapter)
 assert chapter.decided
 
 # %% [markdown]
-# What is wrong, and where:
+# The errors and their places:
 
 # %%
 for case in chapter:

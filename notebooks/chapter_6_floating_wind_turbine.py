@@ -386,9 +386,8 @@ for name in ("m_N", "h_T", "A_pitch", "L_h", "m_P"):
 #
 # The rotor starts by the torque of the wind, which falls as it gets faster, against the torque of the generator, which grows.
 #
-# Every run integrates the work of its loads along with the motion: of wind, drives and damping. What is left of input −
-# dissipation − change of energy, relative to the kinetic energy or the range of the potential energy, whichever is larger, is the
-# error of the run.
+# Every run integrates the work of its loads along with the motion: of wind, drives and damping. The error of the run is input −
+# dissipation − change of energy, relative to the kinetic energy or the range of the potential energy, whichever is larger.
 
 # %%
 RATED = 12.1 * np.pi / 30  # rad/s, of the rotor
@@ -455,7 +454,7 @@ print(f"start-up: roll at the end {np.degrees(start['phi'][-1]):.3f} degrees, at
 # The rotor has the angular momentum $\mathbf L = I_x \Omega\, \mathbf e$ along its shaft $\mathbf e$. Turning the nacelle at
 # $\dot\psi_N$ turns it, $\dot{\mathbf L} = \dot\psi_N \mathbf k \times \mathbf L$, which takes this moment on the rotor. The
 # platform gets the reaction, $-\dot\psi_N \mathbf k \times \mathbf L$. With the shaft along $x$, $\mathbf k \times \mathbf i =
-# \mathbf j$: the moment is along $-y$, the pitch is negative, and the turbine leans against the wind. That is the sign of the
+# \mathbf j$: the moment is along $-y$, the pitch is negative, and the turbine leans against the wind. This is the sign of the
 # term of section 1. When the nacelle has turned, $\mathbf e = [\cos\psi_N, \sin\psi_N, 0]$ gives a moment $+\sin\psi_N$ in roll.
 #
 # The nacelle turns by 37.5° at 0.5° per second, begun and ended gently, with the rotor spinning and with the rotor at rest. The

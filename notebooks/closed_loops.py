@@ -15,8 +15,8 @@
 # mechanisms impossible. The augmented formulation keeps all coordinates, adds the constraints between them, and makes the
 # constraint forces unknowns, too: the multipliers. This is the lecture's chapters 3.3, 3.4 and 6.3.
 #
-# The notebook goes from a pendulum by hand to mechanisms with published solutions. On the way it shows what keeps a motion on
-# its constraints, what forces the joints carry, and what happens where constraints depend on each other.
+# The notebook goes from a pendulum by hand to mechanisms with published solutions. It shows how a motion is kept on
+# its constraints, which forces the joints carry, and what happens where constraints depend on each other.
 
 # %%
 import tempfile
@@ -90,7 +90,7 @@ assert sp.simplify(force - sp.Matrix([0, m * g])).is_zero_matrix
 # %% [markdown]
 # ### Without multipliers
 #
-# The rows of a dependent coordinate determine the multiplier. What is left of the other rows is an equation of motion without
+# The rows of a dependent coordinate determine the multiplier. The other rows then give an equation of motion without
 # it. On a fixed track that falls at the angle $\theta$ this is the lecture's example of chapter 3.3.
 
 # %%
@@ -101,10 +101,10 @@ show(r"\lambda", track.lam)
 show_all(track.without_multipliers([y]))
 
 # %% [markdown]
-# ## 2. What keeps a motion on its constraints
+# ## 2. Keeping a motion on its constraints
 #
-# The solver knows $\ddot C = 0$ only. So $\dot C$ keeps what rounding and the errors of the steps make of it, and $C$ drifts
-# away. There are three ways:
+# The equations of motion contain $\ddot C = 0$ only. Rounding and the errors of the steps stay in $\dot C$, and $C$ drifts
+# away. There are three ways to treat this:
 #
 # - nothing at all (`stabilization="none"`);
 # - Baumgarte's method: $\ddot C + 2 a \dot C + a^2 C = 0$ in place of $\ddot C = 0$ pulls the motion back (`"baumgarte"`, with
@@ -142,16 +142,16 @@ for title, sol in runs.items():
 assert np.abs(runs["projection"].constraint_violation).max() < 1e-12
 
 # %% [markdown]
-# Projection keeps the constraint to rounding and takes as many steps as no stabilization at all. What is left are the errors of
-# the steps along the constraint. They show in the energy, and a smaller `rtol` makes them smaller. Baumgarte's method is there
-# for integrators that build on several earlier steps, such as `BDF` and `LSODA`: these do not stand a state that is changed
+# Projection keeps the constraint to rounding and takes as many steps as no stabilization at all. The errors of the steps along
+# the constraint remain. They show in the energy, and a smaller `rtol` makes them smaller. Baumgarte's method is meant
+# for multistep methods, such as `BDF` and `LSODA`, which do not allow the state to be changed
 # after a step.
 
 # %% [markdown]
 # ## 3. A four-bar linkage from bodies and joints
 #
 # Three bars hang on each other like a chain: the crank on the ground, the coupler on the crank, the rocker on the
-# coupler. That is a tree, described as any other. The last hinge, between rocker and ground, closes the loop:
+# coupler. This is a tree, described as any other. The last hinge, between rocker and ground, closes the loop:
 # `close_loop` takes the same joint classes as `add_joint`, and makes constraints of them. A motor drives the crank.
 
 # %%
@@ -197,9 +197,9 @@ print("rows:", ", ".join(module.metadata.constraints))
 # %% [markdown]
 # ### Consistent states
 #
-# A simulation must start on the constraints. From a state that does not fulfil them it raises instead of guessing what was
-# meant. `consistent` finds the nearest state that does. Of the two ways to put the linkage together the guess decides, and
-# `keep` holds what must stay: here the angle of the crank.
+# A simulation must start on the constraints. A state that does not fulfil them raises an error.
+# `consistent` finds the nearest state that does. The guess selects one of the two ways to put the linkage together, and
+# `keep` names the coordinates that must not change: here the angle of the crank.
 
 # %%
 try:
@@ -257,10 +257,10 @@ with tempfile.TemporaryDirectory() as folder:
     display(Image(data=film.read_bytes(), format="gif"))
 
 # %% [markdown]
-# ## 4. What the joints carry
+# ## 4. Forces in the joints
 #
 # `sol.reactions` has the force and the moment of every joint on its child body, those of the tree and those that close loops,
-# in the axes of the n-frame. They are what is needed to choose a bearing. For the hinge that closes the loop they are the
+# in the axes of the n-frame. A bearing is chosen by them. For the hinge that closes the loop they are the
 # multipliers themselves, with the sign of $-\mathbf C_r^T \boldsymbol\lambda$.
 
 # %%
@@ -293,8 +293,8 @@ plt.show()
 # %% [markdown]
 # ## 5. Absolute coordinates
 #
-# In absolute coordinates each body has $x$, $y$ and $\theta$ of its own, and every joint becomes constraints. One word is
-# enough. Hinge A keeps its angle besides, because the motor acts along it.
+# In absolute coordinates each body has $x$, $y$ and $\theta$ of its own, and every joint becomes constraints, by
+# one argument. Hinge A keeps its angle as well, because the motor acts along it.
 #
 # The start values of absolute coordinates come from the system's initial values. So these are put on the constraints first.
 
@@ -305,7 +305,7 @@ print("coordinates:", ", ".join(wide.metadata.q))
 print("constraints:", ", ".join(wide.metadata.constraints))
 
 # %% [markdown]
-# Let go with the motor off, the mechanism moves alike in both, and its joints carry the same.
+# Released with the motor off, the mechanism has the same motion and the same forces in its joints.
 
 # %%
 free = module.simulate((0, 2), q, inputs={tau: 0.0}, rtol=1e-10)
@@ -316,7 +316,7 @@ for what, a, b in (("acceleration of the rocker", free.outputs["acceleration"], 
     assert np.allclose(a, b, atol=1e-6)
 
 # %% [markdown]
-# What differs is the work. Absolute coordinates have a mass matrix that is nearly diagonal and constant, but many more unknowns.
+# The numbers of operations differ. Absolute coordinates have a mass matrix that is nearly diagonal and constant, but many more unknowns.
 # The report of a module counts the operations of its right-hand side.
 
 # %%
@@ -351,7 +351,7 @@ def error(sol):
 assert error(end) < 1e-9
 
 # %% [markdown]
-# What does accuracy cost? Every point is one tolerance. The error stops falling near $10^{-10}$ because the published row
+# The picture shows the time over the accuracy; every point is one tolerance. The error stops falling near $10^{-10}$ because the published row
 # itself is good to about ten digits. With loose tolerances little is saved: steps are longer, but after a long step the
 # projection has more to correct.
 
@@ -453,15 +453,16 @@ print(f"uprights apart: {np.ptp(falling.q[:, :3], axis=1).max():.1e} rad, energy
 assert difference < 1e-5
 
 # %% [markdown]
-# The motion goes straight on, as inertia has it. A mechanism that comes to rest exactly there could go on either way, and
-# multipliers are not unique. `diagnose` reports beforehand where such positions are.
+# The motion continues straight through these positions, by its inertia. A mechanism that comes to rest exactly there could
+# continue either way, and multipliers are not unique. `diagnose` reports such positions beforehand.
 
 # %% [markdown]
 # ## 9. What to read next
 #
 # - `vehicle_on_rotating_track`: the embedding technique step by step, with constraints solved by hand.
 # - `a_new_mechanism`: from a description of your own to C.
-# - `README.md`: loads, joints, stabilization, conventions of signs and tolerances.
+# - [Describing mechanisms](../docs/describing_mechanisms.md): joints and loads; [constraints](../docs/constraints.md): stabilization,
+#   conventions of signs and tolerances.
 #
 # On the command line, `symdyn list` shows the catalogue, with loops and constraints of all kinds: rods, ball joints, rolling
 # without slip.

@@ -12,7 +12,7 @@
 # # Slides of your own, compared with what symdyn derives
 #
 # A case holds formulas as a slide prints them, and what symdyn derives for them. Every entry gets a verdict: equal, equal up to a
-# named convention, wrong (with a proof), unreadable, or, as long as nobody has looked into it, different.
+# named convention, wrong (with a proof), unreadable, or, until it has been examined, different.
 
 # %%
 import sympy as sp
@@ -77,7 +77,7 @@ sd.compare(sd.Case("letters", slide=slide, formulas=[
 #
 # A slide may count the other direction as positive, print the transposed rotation, put coordinates in another order, refer to
 # another point, or multiply an equation by a factor. Such a convention is named, and has to make the derived formula *equal* to
-# the print; it cannot excuse anything else.
+# the print; no other difference is accepted.
 
 # %%
 psi = sd.coordinates("psi")
@@ -92,7 +92,7 @@ sd.compare(sd.Case("conventions", formulas=[
 # %% [markdown]
 # ## 4. Errors, with a proof
 #
-# That a print differs from what a program derives proves nothing about who is right. An erratum therefore comes with a proof by
+# A difference between a print and a derived formula does not show which of them is right. An erratum therefore comes with a proof by
 # something that does not use the formula. It is measured for both, the print and the right formula, and holds if the right one
 # fulfils it and the print visibly does not. Here the sign of the weight's moment: with it the pendulum would gain energy.
 

@@ -131,7 +131,7 @@ assert np.abs(near.x - exact).max() < 1e-8
 print("slowest of the sampled loop: |z| =", np.abs(np.linalg.eigvals(loop)).max().round(4))
 
 # %% [markdown]
-# What is left of the difference is the nonlinearity: it falls with the cube of the distance.
+# The remaining difference is due to the nonlinearity: it falls with the cube of the distance.
 #
 # ## What to read next
 #

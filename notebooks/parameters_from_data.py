@@ -12,7 +12,7 @@
 # # Parameters fitted to measurements
 #
 # A drum on a torsion spring is turned and let go, and its angle is recorded. Which stiffness, which friction, which
-# inertia? And how well does the record know them? The measurements here are made by the computer, so that the truth is
+# inertia? And how well does the record determine them? The measurements here are computed, so that the true values are
 # known.
 
 # %%
@@ -59,7 +59,7 @@ def record(extra):
 alone, heavier = record(0.0), record(added)
 
 # %% [markdown]
-# ## 3. What one record cannot know
+# ## 3. What one record does not determine
 #
 # A single record fixes the frequency, so $k/I$, but not $k$ and $I$ alone: all torques may be twice as large if the
 # inertia is. The fit finds that out by itself and names the combination.
@@ -96,7 +96,7 @@ for symbol, value in truth.items():
 # %% [markdown]
 # ## 5. Are the residuals noise?
 #
-# What is left should look like the noise of the sensor, and nothing else.
+# The residuals should look like the noise of the sensor alone.
 
 # %%
 found.plot()

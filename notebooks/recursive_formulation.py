@@ -56,7 +56,7 @@ arm.add_joint_force(elbow, tau2, name="motor2")
 arm.defaults = {g: 9.81, m1: 2.0, I1: 0.042, l_c1: 0.25, l1: 0.5, m2: 1.0, I2: 0.013, l_c2: 0.2}
 
 # %% [markdown]
-# `arm.recursive()` instead of `arm.embedding()`, and that is all. What the lecture names of a link is asked for by the name
+# `arm.recursive()` instead of `arm.embedding()`, and that is all. The lecture's quantities of a link are requested by the name
 # of its body.
 
 # %%
@@ -240,8 +240,8 @@ assert np.allclose(np.array(by_hand, dtype=float), embedded, rtol=1e-12)
 # ## 6. Both formulations agree
 #
 # The same comparison for a chain of three bodies in space, with compiled code, at a thousand random states. They differ in the
-# last digits only. What `equations.verify()` checks holds for each by itself; of recursive equations it checks the Coriolis
-# matrix, too.
+# last digits only. `equations.verify()` checks each formulation by itself; for recursive equations it also checks the Coriolis
+# matrix.
 
 # %%
 chain = sd.systems.spatial_chain(n=3)
@@ -389,7 +389,8 @@ assert missing < 1.2 * noise
 # - `two_link_arm`: the same arm by the embedding technique, then with motors that are controlled.
 # - `vehicle_on_rotating_track`: the embedding technique step by step.
 # - `a_new_mechanism`: from a description of your own to C.
-# - `README.md`: joints, loads, outputs (also Jacobians and accelerations of points), files that stand alone, command line.
+# - [Describing mechanisms](../docs/describing_mechanisms.md): joints, loads, outputs (also Jacobians and accelerations of points);
+#   [evaluating and simulating](../docs/numbers.md): files that stand alone; [command line](../docs/command_line.md).
 #
 # On the command line, `symdyn derive two_link_arm --formulation recursive --quantity I_A_1 coriolis` prints without any
 # Python, and `symdyn report spatial_chain --tune` shows the table of candidates.

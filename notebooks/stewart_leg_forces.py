@@ -12,7 +12,7 @@
 # # A Stewart platform and the forces in its legs
 #
 # Six legs carry a platform and move it in all six freedoms. Which forces do the drives need for a given motion, and how
-# near is a pose where they would have to be infinite? Legs, platform and joints form five loops more than a tree has.
+# near is a pose where they would have to be infinite? Legs, platform and joints form five independent loops.
 
 # %%
 import matplotlib.pyplot as plt
@@ -97,8 +97,8 @@ assert off < 1e-5
 # %% [markdown]
 # ## 4. How near is a singular pose?
 #
-# Turned about the vertical, the legs get into one another's directions: at a right angle the platform can no longer be
-# held, and the forces grow without bound. The condition number of the actuation shows it beforehand.
+# When the platform turns about the vertical, the directions of the legs become dependent: at a right angle the legs can no longer
+# hold it, and the forces grow without bound. The condition number of the actuation shows it beforehand.
 
 # %%
 turns = np.radians(np.arange(0, 86, 5))

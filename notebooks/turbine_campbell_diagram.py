@@ -11,7 +11,7 @@
 # %% [markdown]
 # # A floating turbine from rest to a Campbell diagram
 #
-# How deep does it float, how long does it pitch, and at which rotor speeds do blades and tower meet what excites them? The
+# How deep does it float, which period does its pitch have, and at which rotor speeds are blades and tower excited? The
 # turbine is that of the catalogue: the NREL 5-MW machine on a barge. Chapter 6 of the course has all of its parts.
 
 # %%

@@ -144,7 +144,7 @@ swing.plot()
 # ### Target
 #
 # The tip has to go to a point above the shoulder, to the right, and stop there. The cosine law in the triangle of shoulder,
-# elbow and tip gives the angles. Of the two solutions, take the one with the elbow to the right, $q_2 > 0$.
+# elbow and tip gives the angles. There are two solutions; the one with the elbow to the right is taken, $q_2 > 0$.
 
 # %%
 target = np.array([0.3, 0.6])
@@ -169,7 +169,7 @@ sagging = module.simulate(**hanging, inputs=lambda t, x: stiffness * (goal - x[:
 print(f"distance of the tip from the target: {np.linalg.norm(sagging.outputs['tip'][-1] - target) * 1e3:.1f} mm")
 
 # %% [markdown]
-# ### PD control with the weight taken off
+# ### PD control with compensation of the weight
 #
 # The module gives the torque that holds the arm still where it is: inverse dynamics with zero speed and zero
 # acceleration. With it added, the goal is the only place of rest.
@@ -186,7 +186,7 @@ reaching.plot()
 # %% [markdown]
 # ### Work of the motors
 #
-# What the motors put in is the energy of the lifted arm. They gave more at first, and took the rest back as brakes.
+# The work of the motors is the increase of the arm's energy. They supply more at first, and absorb the rest as brakes.
 
 # %%
 print(f"work of the motors: {reaching.work[-1]:.4f} J, at most {reaching.work.max():.4f} J")

@@ -52,6 +52,48 @@ def found(paths: list[Path], words: dict[str, str]) -> list[str]:
             for k, line in prose(path) for match in pattern.finditer(re.sub(r"`[^`]*`", "", line))]
 
 
+# Sentences that begin so have a clause for a subject, or their subject late.
+BEGINNINGS = re.compile(r"(What|Of|With which|Whoever)\b")
+SPLIT = re.compile(r"(?<=[.!?:])\s+(?=[A-Z`*\[])|\s*\|\s*")
+TWICE = re.compile(r"\b([a-z]+) \1\b")
+
+
+def paragraphs(path: Path) -> Iterator[tuple[int, str]]:
+    """Paragraphs, items of lists and rows of tables, each with its first line; headings are left out."""
+    notebook = path.suffix == ".py" and path.is_relative_to(ROOT / "notebooks")
+    begun, last, text = 0, 0, ""
+    for k, line in prose(path):
+        stripped = line.removeprefix("#" if notebook else "").strip()
+        if text and (k != last + 1 or not stripped or re.match(r"[-*|#] ?|\d+\. |%%", stripped)):
+            yield begun, text
+            text = ""
+        if stripped and not stripped.startswith(("#", "%%")):
+            begun, text = (begun, f"{text} {stripped}") if text else (k, re.sub("^[-*] ", "", stripped))
+        last = k
+    if text:
+        yield begun, text
+
+
+def clumsy(path: Path) -> list[str]:
+    """Sentences that begin with a clause in place of a subject, or have a word twice."""
+    found = [(k, one.strip(" -*")) for k, paragraph in paragraphs(path) for one in SPLIT.split(paragraph)]
+    return [f"{path.name}:{k}: {one[:60]}" for k, one in found
+            if (BEGINNINGS.match(one) and not one.endswith("?")) or TWICE.search(one)]
+
+
+def test_sentences_begin_with_their_subject() -> None:
+    """As docs/style.md asks; and no word stands twice."""
+    assert [line for page in PAGES if page != STYLE for line in clumsy(page)] == []
+
+
+def test_a_clumsy_sentence_is_found(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    text = "# What it is\n\nA mass. What is left is\nzero. What is it?\n\n- Of two the first is taken.\n\nIt is is so.\n"
+    page.write_text(text, encoding="utf-8")
+    expected = ["page.md:3: What is left is zero.", "page.md:6: Of two the first is taken.", "page.md:8: It is is so."]
+    assert clumsy(page) == expected
+
+
 def test_pages_and_notebooks_use_the_words_of_the_field() -> None:
     assert found(PAGES, unwanted(STYLE.read_text(encoding="utf-8"))) == []
 
