@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 import symdyn
 
 project = "symdyn"
-author = "the symdyn developers"
+author = copyright = "the symdyn developers"
 release = version = symdyn.__version__
 html_title = f"symdyn {version}"
 

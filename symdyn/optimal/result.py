@@ -63,7 +63,7 @@ class Optimum(OverTime):
     >>> module = sd.systems.cart_pole().compile()
     >>> F = sd.inputs("F")
     >>> there = {"q1": 0.5, "q2": 0, "q1_dot": 0, "q2_dot": 0}
-    >>> found = sd.optimize(module, sd.Loss(integral=F**2), 1.0, start={"q2": 0.0}, end=there, intervals=8, tolerance=None,
+    >>> found = sd.optimize(module, sd.Loss(integral=F**2), 1.0, start={"q2": 0.0}, end=there, intervals=12, tolerance=None,
     ...                     method="slsqp")
     >>> found.x.shape, bool(abs(found["q1"][-1] - 0.5) < 1e-6)
     ((17, 4), True)
