@@ -66,7 +66,7 @@ class Optimum(OverTime):
     >>> found = sd.optimize(module, sd.Loss(integral=F**2), 1.0, start={"q2": 0.0}, end=there, intervals=12, tolerance=None,
     ...                     method="slsqp")
     >>> found.x.shape, bool(abs(found["q1"][-1] - 0.5) < 1e-6)
-    ((17, 4), True)
+    ((25, 4), True)
     """
 
     module: Module
