@@ -45,7 +45,7 @@ class CompilerNotFound(SymdynError):
 
 
 class CompilerWarning(UserWarning):
-    """What was written has no binary, because there is no C compiler; the message says what can be done with it."""
+    """Warns that written files have no binary, because there is no C compiler; the message says how they can be used."""
 
 
 class ModelWarning(UserWarning):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
@@ -10,6 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+import symdyn as sd
+from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
 STYLE = ROOT / "docs" / "style.md"
@@ -76,14 +80,28 @@ def paragraphs(path: Path) -> Iterator[tuple[int, str]]:
 
 def clumsy(path: Path) -> list[str]:
     """Sentences that begin with a clause in place of a subject, or have a word twice."""
-    found = [(k, one.strip(" -*")) for k, paragraph in paragraphs(path) for one in SPLIT.split(paragraph)]
-    return [f"{path.name}:{k}: {one[:60]}" for k, one in found
-            if (BEGINNINGS.match(one) and not one.endswith("?")) or TWICE.search(one)]
+    return [f"{path.name}:{k}: {one[:60]}" for k, paragraph in paragraphs(path) for one in sentences(paragraph)
+            if begins_late(one) or TWICE.search(one)]
+
+
+def sentences(paragraph: str) -> list[str]:
+    return [one.strip(" -*") for one in SPLIT.split(paragraph)]
+
+
+def begins_late(sentence: str) -> bool:
+    return BEGINNINGS.match(sentence) is not None and not sentence.endswith("?")
 
 
 def test_sentences_begin_with_their_subject() -> None:
     """As docs/style.md asks; and no word stands twice."""
     assert [line for page in PAGES if page != STYLE for line in clumsy(page)] == []
+
+
+def test_public_docstrings_begin_sentences_with_their_subject() -> None:
+    """Those of the reference, without their examples."""
+    public = {**PUBLIC, **{name: getattr(sd, name) for name in sd.__all__}}
+    texts = {name: (inspect.getdoc(thing) or "").partition(">>>")[0] for name, thing in public.items()}
+    assert [(name, one) for name, text in texts.items() for one in sentences(" ".join(text.split())) if begins_late(one)] == []
 
 
 def test_a_clumsy_sentence_is_found(tmp_path: Path) -> None:

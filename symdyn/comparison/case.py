@@ -76,7 +76,7 @@ class Erratum:
 
 @dataclass(frozen=True)
 class Remark:
-    """What is wrong on a slide without a formula to compare: a label, a word, an index that changes no value.
+    """A mistake on a slide without a formula to compare: a label, a word, an index that changes no value.
 
     why          one sentence
     line, also   where it is printed, and where it is printed again

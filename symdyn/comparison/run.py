@@ -42,7 +42,7 @@ def compare(case: Equations, other: Equations | Derived) -> Proofs: ...
 
 
 def compare(case: Case | str | Equations | Iterable[Case | str], other: Equations | Derived | None = None) -> Any:
-    """What slides print compared with what symdyn derives, entry by entry, with a verdict each.
+    """Compare printed formulas of slides with derived ones, entry by entry, with a verdict each.
 
     case   a Case of your own; the name of a case of the lecture ("pendulum-augmented"; names: symdyn.lecture.names()); a section
            or a chapter of it ("3.5", "3"), for all of its cases; or several of these. Equations, together with

@@ -30,8 +30,8 @@ class Fit(Estimate):
     misfit       of residuals by the degrees of freedom, in units of the noise: about 1 where a noise that was given is right; 1
                  where it was estimated
     undetermined   combinations of unknowns, relative to their guesses, that the data do not determine: text, from the singular
-                 vectors of the derivatives; shares below a thousandth of the largest are left out. Of all values that fit as well
-                 those are taken that are nearest to the guesses
+                 vectors of the derivatives; shares below a thousandth of the largest are left out. Among values that fit
+                 equally well those nearest to the guesses are taken
     at_bounds    labels of values that the data press against a bound
     motions      of the experiments with these values; residuals: (experiment, what was measured) -> measured - model, (n_t, ...)
     success, message   whether the iteration ended at a minimum, and why it ended; n_runs: motions an experiment that it took

@@ -46,7 +46,7 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
 
     MuJoCo's own compiler resolves default classes, frames, orientations and inertias of geoms. Coordinates are MuJoCo's: q_JOINT
     of hinges and slides, e0_ ... e3_JOINT of balls, and before these x_, y_, z_JOINT of free joints; so are the speeds, and the
-    initial state. Of several joints of one body the inner ones carry bodies without mass. Armature is a body on the ground that
+    initial state. Several joints of one body are connected by bodies without mass. Armature is a body on the ground that
     the coordinate moves. connect and weld become exact loops, couplings of joints and tendons exact constraints; in MuJoCo they
     are
     soft. Actuators are inputs called after them; those with a state have act_NAME.

@@ -86,7 +86,7 @@ def jacobian(body: Body, at: Vector = (0, 0, 0)) -> Point:
 def bias_acceleration(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """J_dot u of a point of a body, (6,), for `System.add_output`: [a; alpha] = J u_dot + J_dot u, rows as in `jacobian`.
 
-    What is left of the accelerations when u_dot = 0; given motion is part of it. m/s^2 and rad/s^2.
+    The accelerations at u_dot = 0, m/s^2 and rad/s^2; given motion is part of them.
 
     >>> system = sd.systems.pendulum()
     >>> system.add_output("tip", sd.bias_acceleration("bob", [0, -1]))

@@ -215,7 +215,7 @@ def multiplier(name: str) -> Quantity:
 
 
 def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.ImmutableMatrix:
-    """What a joint transmits to its child, (6, 1): force (N), then moment about the joint's point on the child (N m).
+    """Load that a joint transmits to its child, (6, 1): force (N), then moment about the joint's point on the child (N m).
 
     frame   a body in whose axes the components are taken; default: the n-frame
     As in the quantity `reactions`, what the joint's own drive gives along its speeds is left out. Its entries may stand in loads,

@@ -263,7 +263,7 @@ def described(symbol: sp.Symbol) -> str:
 def partial_rate(value: Scalar) -> sp.Expr:
     """The partial derivative by t of an expression or matrix: coordinates, their derivatives, speeds and inputs are constant.
 
-    What is left of `symdyn.rate` where nothing moves, such as the C_t of a constraint; `value.diff(symdyn.t)` is the total
+    It is `symdyn.rate` for a mechanism at rest, such as the C_t of a constraint; `value.diff(symdyn.t)` is the total
     derivative. Raises ModelError for what is neither expression nor matrix.
 
     >>> q = sd.coordinates("q")

@@ -491,10 +491,11 @@ class System:
         reset      coordinates, speeds and extra states with expressions for what they become, from the state before the
                    event: {v: -e*v} for a ball that bounces. Events at the same time make their resets in the order in which
                    they were added, each from the state before all of them: of two for one speed the later counts. Without
-                   constraints all else stays. With them, and so in absolute coordinates, what is reset becomes what it says,
-                   and the others follow: they change by as little as the constraints allow in the metric of the mass matrix,
-                   coordinates first, then speeds. For speeds that is the impact by impulses along what is reset alone, such as
-                   in a joint; a speed that is to stay is named, {w: w}. What the constraints do not allow ends the run
+                   constraints all else stays. With them, and so in absolute coordinates, variables that are reset take their
+                   values, and the others follow: they change by as little as the constraints allow in the metric of the mass
+                   matrix, coordinates first, then speeds. For speeds that is the impact by impulses along these variables
+                   alone, such as in a joint; a speed that is to stay is named, {w: w}. A reset that constraints do not
+                   allow ends the run
 
         >>> system = sd.systems.pendulum()
         >>> q, = system.initial
@@ -507,7 +508,7 @@ class System:
             self.events.append(made)
 
     def draw(self, body: BodyOrName, *shapes: Shape, color: str | Sequence[float] | None = None) -> None:
-        """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
+        """Give a body shapes for pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
 
         color   text such as '#3377aa', '0.8' or 'orange', or three numbers from 0 to 1; default: one for each body
 
@@ -530,7 +531,7 @@ class System:
     def check(self) -> Model:
         """The checked, frozen model; it prints as a summary, with `details()` for all of it.
 
-        What is doubtful but possible, such as moments of inertia that no real body has, is warned of once for each system
+        A doubtful but possible value, such as moments of inertia that no real body has, gives one warning for each system
         (ModelWarning) and stays in the model's `doubts`. Raises ModelError with every fault found.
 
         >>> sd.systems.pendulum().check().bodies[0].name
@@ -593,7 +594,7 @@ class System:
 
     def diagnose(self, q: Values | None = None, params: Values | None = None, t: float = 0.0, coordinates: str = "relative",
                  reach: float = math.pi) -> Diagnosis:
-        """What the constraints do: freedoms, redundant and contradictory constraints, singular configurations, idle motions.
+        """Examine the constraints: freedoms, redundant and contradictory constraints, singular configurations, idle motions.
 
         q             coordinates of the state to look at, in order, or by symbol or name; what is left out takes its initial
                       value; the nearest consistent state is taken

@@ -31,7 +31,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Report:
-    """What was generated, what was skipped and why; prints as text.
+    """Report of what was generated, what was skipped and why; prints as text.
 
     many   how many states and motions are computed at once
     """

@@ -1,7 +1,7 @@
 """Rotations: matrices, Euler angles, axis and angle, Euler parameters, angular velocity; numbers and SymPy expressions alike.
 
 R takes components in b to components in n. Numbers and NumPy arrays in, NumPy arrays out, with any leading axes; anything of
-SymPy in, SymPy matrices out. Angles are in rad. What cannot be done raises RotationError (GimbalLock, NotARotation, ZeroAxis,
+SymPy in, SymPy matrices out. Angles are in rad. Invalid arguments raise RotationError (GimbalLock, NotARotation, ZeroAxis,
 NotNormalized) or ArgumentError.
 
 Tolerances, all on numbers:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Loss:
-    """What a motion costs: the integral of `integral` over time, and `end` at its end.
+    """Cost of a motion: the integral of `integral` over time, and `end` at its end.
 
     Each is an expression of coordinates, speeds, extra states, inputs, parameters, sd.t and entries of outputs, which are called
     "height" or "tip[0]"; or a function of (t, x, p), with x = [q; u; z] and p the parameters in the module's order, that returns

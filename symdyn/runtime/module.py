@@ -542,7 +542,7 @@ class Module:
         return found if found is not None else np.zeros(self.shape(name), dtype=bool)
 
     def breaks(self) -> Tape | None:
-        """What passes zero where the right-hand side has a kink or a jump, a tape with the output `surfaces`; None where it has
+        """Surfaces at which the right-hand side has a kink or a jump, a tape with the output `surfaces`; None where it has
         none, or where the module was put together without equations.
 
         >>> sd.systems.pendulum().compile(backend="numpy").breaks() is None
@@ -617,8 +617,8 @@ class Module:
                    keep: Names = (), *, inputs: States | None = None) -> tuple[np.ndarray, np.ndarray]:
         """A state that fulfils the constraints: q (n_q,) and u (n_u,) near the guess, by the smallest change of both.
 
-        q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. Of several
-                solutions (branches) the guess decides
+        q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. The guess
+                selects one of several solutions (branches)
         keep    coordinates and speeds, by name or symbol, that stay as given
         inputs  values and rates of motions that the constraints follow, {z: 0.1, z.dot: 0.3}, or as for `simulate`, at t
         The change is the smallest in the metric of the mass matrix, as that of the projection in `simulate`: the speeds are
@@ -714,9 +714,9 @@ class Module:
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
-        see symdyn.runtime.integrating.chatter. Of steps that are far too short, and of events whose zeros may be missed, a
-        SimulationWarning is given and kept in the Solution's `doubts`. What a function of the user raises ends a run like that,
-        and is its `cause`. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
+        see symdyn.runtime.integrating.chatter. Steps that are far too short, and events whose zeros may be missed, give a
+        SimulationWarning, which is kept in the Solution's `doubts`. An exception in a function of the user ends a run in the same
+        way, and is its `cause`. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
         Raises ArgumentError for values that do not fit.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -1065,7 +1065,7 @@ class Module:
     # -- about the module
 
     def report(self) -> Report:
-        """What was generated, what was skipped and why, operation counts; prints as text.
+        """Report what was generated, what was skipped and why, and operation counts; prints as text.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.report().rows[0].function

@@ -1,6 +1,6 @@
 """Contacts: where bodies touch, by which law, and the loads, events and rows that this makes of them.
 
-What users call as sd.contacts: shapes, and what a compliant contact yields by.
+Users reach these names as sd.contacts: shapes, and the laws of compliant contacts.
 """
 
 from symdyn.model.contacts.compliance import Bristles, Compliance, hertz

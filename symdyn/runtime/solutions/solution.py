@@ -252,7 +252,7 @@ class Solution:
 
     @cached_property
     def contacts(self) -> Mapping[str, ContactMotion]:
-        """What contacts did: name -> mode, gap, force, slip and impulse over time, impacts, see ContactMotion.
+        """Course of contacts: name -> mode, gap, force, slip and impulse over time, impacts, see ContactMotion.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> dict(solution.contacts)
@@ -262,7 +262,7 @@ class Solution:
 
     @cached_property
     def contact_groups(self) -> Mapping[str, GroupMotion]:
-        """What groups of contacts did: name -> pairs that were near, with mode, gap and forces over time, see GroupMotion.
+        """Course of groups of contacts: name -> pairs that were near, with mode, gap and forces over time, see GroupMotion.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> dict(solution.contact_groups)
@@ -272,8 +272,8 @@ class Solution:
 
     @property
     def stepped(self) -> Stepped | None:
-        """Of a motion by method="moreau" its steps, what is left of the laws of contact (residual, m/s; depth, m), and the
-        estimate of its error, see Stepped; None of other motions.
+        """Steps of a motion by method="moreau", residuals of the laws of contact (residual, m/s; depth, m), and the
+        estimate of its error, see Stepped; None for other motions.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> solution.stepped is None
@@ -532,9 +532,9 @@ class Solution:
     def reactions(self) -> dict[str, np.ndarray]:
         """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6).
 
-        A reaction is what the joint holds by its shape. What acts along its speeds is none: joint forces (drives, springs and
-        dampers in the joint), gears (sd.Gear), and constraints by expression. What holds a coordinate that is given by an
-        expression, prescribed or dependent (coordinate=2*p), is a reaction. `cut_loads` has both.
+        A reaction is the load of the joint as a constraint, including the load that enforces a coordinate given by an expression,
+        prescribed or dependent (coordinate=2*p). It excludes loads along the joint's speeds: joint forces (drives, springs and
+        dampers in the joint), gears (sd.Gear), and constraints by expression. `cut_loads` has both.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> solution.reactions["pivot"].shape
@@ -595,7 +595,7 @@ class Solution:
 
     @property
     def energy_scale(self) -> tuple[float, bool]:
-        """What errors of energy are measured by, J, see `energy_error`; and whether the mechanism rests.
+        """Scale by which errors of energy are divided, J, see `energy_error`; and whether the mechanism rests.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> solution.energy_scale[0] > 0
