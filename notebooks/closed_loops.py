@@ -59,8 +59,8 @@ pendulum = sd.augmented([x, y], mass=[m, m], force=[0, -m * g], constraints=[x**
 display(pendulum)
 
 # %% [markdown]
-# In the matrix, $\mathbf C_r$ is the derivative of the constraint by the coordinates. Its second derivative by time must vanish,
-# which gives the last row:
+# In the matrix, $\mathbf C_r$ is the derivative of the constraint by the coordinates. Its second derivative by time must
+# vanish, which gives the last row:
 #
 # $$\mathbf C_r \ddot{\mathbf r} = F_d \qquad F_d = -(\mathbf C_r \dot{\mathbf r})_r \dot{\mathbf r} - 2 \mathbf C_{rt}
 # \dot{\mathbf r} - C_{tt}$$
@@ -277,8 +277,8 @@ print(f"largest difference: {np.abs(held - needed).max():.1e} N, of forces up to
 assert np.allclose(held, needed, atol=1e-8)
 
 # %% [markdown]
-# `sol.reaction(joint, frame)` turns them into the axes of a body. In the axes of the rocker the first component is along the bar,
-# the second across.
+# `sol.reaction(joint, frame)` turns them into the axes of a body. In the axes of the rocker the first component is along the
+# bar, the second across.
 
 # %%
 along, across = motion.reaction("D", frame="child")[:, :2].T
@@ -316,8 +316,8 @@ for what, a, b in (("acceleration of the rocker", free.outputs["acceleration"], 
     assert np.allclose(a, b, atol=1e-6)
 
 # %% [markdown]
-# The numbers of operations differ. Absolute coordinates have a mass matrix that is nearly diagonal and constant, but many more unknowns.
-# The report of a module counts the operations of its right-hand side.
+# The numbers of operations differ. Absolute coordinates have a mass matrix that is nearly diagonal and constant, but many
+# more unknowns. The report of a module counts the operations of its right-hand side.
 
 # %%
 print(f"{'':18}{'coordinates':>12}{'multipliers':>12}{'operations':>12}")
@@ -351,9 +351,9 @@ def error(sol):
 assert error(end) < 1e-9
 
 # %% [markdown]
-# The picture shows the time over the accuracy; every point is one tolerance. The error stops falling near $10^{-10}$ because the published row
-# itself is good to about ten digits. With loose tolerances little is saved: steps are longer, but after a long step the
-# projection has more to correct.
+# The picture shows the time over the accuracy; every point is one tolerance. The error stops falling near $10^{-10}$ because
+# the published row itself is good to about ten digits. With loose tolerances little is saved: steps are longer, but after a
+# long step the projection has more to correct.
 
 # %%
 tolerances = 10.0 ** -np.arange(3, 13)
@@ -461,8 +461,8 @@ assert difference < 1e-5
 #
 # - `vehicle_on_rotating_track`: the embedding technique step by step, with constraints solved by hand.
 # - `a_new_mechanism`: from a description of your own to C.
-# - [Describing mechanisms](../docs/describing_mechanisms.md): joints and loads; [constraints](../docs/constraints.md): stabilization,
-#   conventions of signs and tolerances.
+# - [Describing mechanisms](../docs/describing_mechanisms.md): joints and loads; [constraints](../docs/constraints.md):
+#   stabilization, conventions of signs and tolerances.
 #
 # On the command line, `symdyn list` shows the catalogue, with loops and constraints of all kinds: rods, ball joints, rolling
 # without slip.

@@ -11,8 +11,8 @@
 # %% [markdown]
 # # Slides of your own, compared with what symdyn derives
 #
-# A case holds formulas as a slide prints them, and what symdyn derives for them. Every entry gets a verdict: equal, equal up to a
-# named convention, wrong (with a proof), unreadable, or, until it has been examined, different.
+# A case holds formulas as a slide prints them, and what symdyn derives for them. Every entry gets a verdict: equal, equal up
+# to a named convention, wrong (with a proof), unreadable, or, until it has been examined, different.
 
 # %%
 import sympy as sp
@@ -92,9 +92,10 @@ sd.compare(sd.Case("conventions", formulas=[
 # %% [markdown]
 # ## 4. Errors, with a proof
 #
-# A difference between a print and a derived formula does not show which of them is right. An erratum therefore comes with a proof by
-# something that does not use the formula. It is measured for both, the print and the right formula, and holds if the right one
-# fulfils it and the print visibly does not. Here the sign of the weight's moment: with it the pendulum would gain energy.
+# A difference between a print and a derived formula does not show which of them is right. An erratum therefore comes with a
+# proof by something that does not use the formula. It is measured for both, the print and the right formula, and holds if
+# the right one fulfils it and the print visibly does not. Here the sign of the weight's moment: with it the pendulum would
+# gain energy.
 
 # %%
 energy = m * l**2 * q.dot**2 / 2 - m * g * l * cos(q)

@@ -11,9 +11,9 @@
 # %% [markdown]
 # # A pendulum by hand, as in the lecture
 #
-# A mass on a massless rod is derived in both ways of the lecture's chapter 3, with every matrix printed: by the embedding technique, in its
-# angle, and by the augmented formulation, in its Cartesian coordinates with a multiplier. Both are simulated, and the period and the
-# tension of the rod are compared with their closed forms.
+# A mass on a massless rod is derived in both ways of the lecture's chapter 3, with every matrix printed: by the embedding
+# technique, in its angle, and by the augmented formulation, in its Cartesian coordinates with a multiplier. Both are
+# simulated, and the period and the tension of the rod are compared with their closed forms.
 
 # %%
 import matplotlib.pyplot as plt
@@ -30,8 +30,8 @@ import symdyn as sd
 #
 # The $n$-frame has $x$ to the right and $y$ upward; the rod of length $l$ is hinged at the origin. Newton's law of the mass is
 #
-# $$\mathbf M\, \ddot{\mathbf r} = \mathbf F + \mathbf F_c, \qquad \mathbf M = \begin{bmatrix} m & 0 \\ 0 & m \end{bmatrix}, \quad
-# \mathbf F = \begin{bmatrix} 0 \\ -m g \end{bmatrix}$$
+# $$\mathbf M\, \ddot{\mathbf r} = \mathbf F + \mathbf F_c, \qquad \mathbf M = \begin{bmatrix} m & 0 \\ 0 & m \end{bmatrix},
+# \quad \mathbf F = \begin{bmatrix} 0 \\ -m g \end{bmatrix}$$
 #
 # with the unknown force $\mathbf F_c$ of the rod. It points along the rod.
 
@@ -54,8 +54,9 @@ display(Math(rf"\mathbf r = {latex(r)} \qquad \mathbf J = \frac{{\partial \mathb
 
 # %% [markdown]
 # The velocity is $\dot{\mathbf r} = \mathbf J\, \dot\theta$, and the acceleration
-# $\ddot{\mathbf r} = \mathbf J\, \ddot\theta + \dot{\mathbf J}\, \dot\theta$. The rod pulls at right angles to $\mathbf J$, so that
-# $\mathbf J^T \mathbf F_c = 0$. Newton's law multiplied by $\mathbf J^T$ is therefore an equation without the force of the rod:
+# $\ddot{\mathbf r} = \mathbf J\, \ddot\theta + \dot{\mathbf J}\, \dot\theta$. The rod pulls at right angles to $\mathbf J$,
+# so that $\mathbf J^T \mathbf F_c = 0$. Newton's law multiplied by $\mathbf J^T$ is therefore an equation without the force
+# of the rod:
 #
 # $$\tilde{\mathbf M}\, \ddot\theta + \tilde{\mathbf k} = \tilde{\mathbf F}, \qquad
 # \tilde{\mathbf M} = \mathbf J^T \mathbf M \mathbf J, \quad
@@ -79,8 +80,8 @@ print(sd.prove(embedded.M_tilde, M_tilde), sd.prove(embedded.k_tilde, k_tilde), 
 assert embedded.explicit("accelerations")[0] == -g * sp.sin(theta) / l
 
 # %% [markdown]
-# The force of the rod follows afterwards, $\mathbf F_c = \mathbf M \ddot{\mathbf r} - \mathbf F$. Its component towards the hinge is the
-# tension: the part of the weight along the rod, and the centripetal force.
+# The force of the rod follows afterwards, $\mathbf F_c = \mathbf M \ddot{\mathbf r} - \mathbf F$. Its component towards the
+# hinge is the tension: the part of the weight along the rod, and the centripetal force.
 
 # %%
 tension = sp.simplify(-(embedded.F_c.T * r)[0] / l)
@@ -102,7 +103,8 @@ augmented = sd.augmented([x, y], mass=[m, m], force=list(F), constraints=[x**2 +
 display(Math(rf"{latex(augmented.matrix)} {latex(sp.Matrix([x.ddot, y.ddot, sp.Symbol('lambda')]))} = {latex(augmented.rhs)}"))
 
 # %% [markdown]
-# The multiplier is the solution of these three equations. The force of the rod has the size $2 l \lambda$, which must be the tension.
+# The multiplier is the solution of these three equations. The force of the rod has the size $2 l \lambda$, which must be the
+# tension.
 
 # %%
 lam = augmented.lam[0].subs({x.dot: l * sp.cos(theta) * theta.dot, y.dot: l * sp.sin(theta) * theta.dot}).subs({x: r[0], y: r[1]})
@@ -127,8 +129,8 @@ assert distance < 1e-8
 # %% [markdown]
 # ## 5. Two closed forms
 #
-# The period of a swing of any size is $T = 4 \sqrt{l/g}\; K(\sin^2(\theta_0/2))$ with the complete elliptic integral $K$. In the motion it
-# is twice the time between two passages through the vertical. The energy gives the tension:
+# The period of a swing of any size is $T = 4 \sqrt{l/g}\; K(\sin^2(\theta_0/2))$ with the complete elliptic integral $K$. In
+# the motion it is twice the time between two passages through the vertical. The energy gives the tension:
 # $m g\,(3 \cos\theta - 2 \cos\theta_0)$.
 
 # %%

@@ -389,8 +389,8 @@ assert missing < 1.2 * noise
 # - `two_link_arm`: the same arm by the embedding technique, then with motors that are controlled.
 # - `vehicle_on_rotating_track`: the embedding technique step by step.
 # - `a_new_mechanism`: from a description of your own to C.
-# - [Describing mechanisms](../docs/describing_mechanisms.md): joints, loads, outputs (also Jacobians and accelerations of points);
-#   [evaluating and simulating](../docs/numbers.md): files that stand alone; [command line](../docs/command_line.md).
+# - [Describing mechanisms](../docs/describing_mechanisms.md): joints, loads, outputs (also Jacobians and accelerations of
+#   points); [evaluating and simulating](../docs/numbers.md): files that stand alone; [command line](../docs/command_line.md).
 #
 # On the command line, `symdyn derive two_link_arm --formulation recursive --quantity I_A_1 coriolis` prints without any
 # Python, and `symdyn report spatial_chain --tune` shows the table of candidates.

@@ -57,3 +57,14 @@ def test_example_is_short():
 
 def test_readme_is_short():
     assert len(README.splitlines()) <= 150
+
+
+def test_figures_are_those_of_their_pages():
+    """Every number of the table of speed and accuracy stands on a page that has the command for it."""
+    table = README.partition("## How fast, how accurate")[2].partition("## License")[0]
+    rows = [row for row in re.findall(r"^\| (.+) \|$", table, re.MULTILINE) if re.search(r"\d", row)]
+    pages = "\n".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+                      for name in ("measured", "work_against_error", "firmware"))
+    numbers = {number for row in rows for number in re.findall(r"(?<![\w.])\d[\d,]*(?:\.\d+)?(?:e-?\d+)?", row)}
+    assert len(rows) == 8 and len(numbers) > 15
+    assert {number for number in numbers if not re.search(rf"(?<![\d.,]){re.escape(number)}(?![\d.])", pages)} == set()
