@@ -19,8 +19,8 @@ import symdyn as sd
 from tests.helpers import browser
 
 ROOT = Path(__file__).parents[1]
-# As wide as a screen, and as a telephone.
-WIDTHS = 1280, 400
+# As wide as screens, with and without the contents of a page at its side, and as a telephone.
+WIDTHS = 1400, 1280, 1100, 400
 PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "describing_mechanisms", "printing",
          "measured", "gallery", "gallery/puma560", "gallery/bicycle",
          "reference/system", "reference/module", "contributing", "genindex")
@@ -117,6 +117,16 @@ def test_mechanisms_of_the_gallery_move(site: Path, shown: Any, name: str) -> No
             page.wait_for_timeout(500)
             assert view.evaluate(time) == 0
         page.close()
+
+
+def test_lines_of_formulas_are_aligned(site: Path) -> None:
+    """Long equations are tables of lines; no sign of LaTeX is left over in a formula."""
+    formulas = {page: re.findall("<math.*?</math>", page.read_text(encoding="utf-8"), re.DOTALL)
+                for folder in (site, site / "gallery", site / "theory", site / "tutorials") for page in folder.glob("*.html")}
+    assert sum(map(len, formulas.values())) > 500
+    assert [page.name for page, found in formulas.items() for one in found if re.search(r">\s*(&|&amp;|\\|\[2pt)", one)] == []
+    four_bar = next(one for one in formulas[site / "gallery" / "four_bar.html"] if "align" in one)
+    assert four_bar.count('<mtd columnalign="left">') > 4
 
 
 def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:

@@ -13,12 +13,18 @@ from sphinx.writers.html5 import HTML5Translator
 # The bold letters of Unicode: browsers take no `mathvariant` but "normal" (MathML Core).
 _ALPHABETS = (("A", 26, 0x1D400), ("a", 26, 0x1D41A), ("0", 10, 0x1D7CE), ("\u0391", 25, 0x1D6A8), ("\u03b1", 25, 0x1D6C2))
 _BOLD = {ord(first) + k: chr(bold + k) for first, count, bold in _ALPHABETS for k in range(count)}
+# latex2mathml knows the alignment of lines by this name, and their distance without a number.
+_LINES = (r"\begin{aligned}", r"\begin{align*}"), (r"\end{aligned}", r"\end{align*}"), (r"\\[2pt]", r"\\")
 _VARIANT = re.compile(r'<(m[in]) mathvariant="bold(?:-italic)?">([^<]*)</')
 
 
 def mathml(formula: str, display: str = "inline") -> str:
-    """A formula of LaTeX as MathML."""
+    """A formula of LaTeX as MathML. Raises ValueError for one that is not understood."""
+    for written, known in _LINES:
+        formula = formula.replace(written, known)
     text = convert(formula, display=display).replace('mathvariant="sans-serif"', 'mathvariant="normal"')
+    if "<mi>&</mi>" in text or r"\begin" in text:
+        raise ValueError(f"latex2mathml does not take the formula {formula}")
     return _VARIANT.sub(lambda m: f"<{m[1]}>{unescape(m[2]).translate(_BOLD)}</", text)
 
 

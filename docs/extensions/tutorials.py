@@ -52,8 +52,8 @@ def page_of(source: Path) -> str:
             continue
         parts.append(f"```python\n{cell.source}\n```")
         parts += [block_of(output) for output in shown.get(digest(cell.source), ())]
-    note = (f"The notebook of this page: {{download}}`{source.stem}.ipynb <../../notebooks/{source.stem}.ipynb>`. "
-            "Below the code stands what it showed in one run.")
+    note = (f"The notebook of this page is {{download}}`{source.stem}.ipynb <../../notebooks/{source.stem}.ipynb>`. "
+            "The outputs below the code are those of one run.")
     title, _, rest = "\n\n".join(parts).partition("\n")
     return f"{title}\n\n{note}\n{rest}\n"
 
@@ -78,13 +78,14 @@ def make(app: Sphinx, config: object = None) -> None:
 
 
 def link(app: Sphinx, page: str, source: list[str]) -> None:
-    """Links to notebooks lead to their pages; the page of all tutorials has them in its table of contents."""
+    """Links to notebooks lead to their pages; the page of all tutorials has them in its table of contents, in its order."""
     if page.startswith("tutorials/"):
         return
     up = "../" * page.count("/")
+    listed = list(dict.fromkeys(re.findall(r"notebooks/(\w+)\.ipynb", source[0])))
     source[0] = re.sub(r"\]\((?:\.\./)+notebooks/(\w+)\.ipynb\)", rf"]({up}tutorials/\1{ENDING})", source[0])
     if page == "tutorials":
-        names = "\n".join(f"tutorials/{one.stem}" for one in sources())
+        names = "\n".join(f"tutorials/{name}" for name in listed)
         source[0] += f"\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
 
 
