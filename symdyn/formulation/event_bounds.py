@@ -10,6 +10,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.formulation.equations import Equations
+from symdyn.model.symbols import parts_of
 from symdyn.tape.external import Result, UserFunction
 from symdyn.tape.intervals import Interval, Jet, encloses, enclosures
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, Node
@@ -38,9 +39,16 @@ def unproved(equations: Equations) -> list[str]:
 
 
 def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
-    found = set()
-    for part in sp.preorder_traversal(expression):
-        if part.free_symbols <= parameters:
+    found, known = set(), dict[sp.Basic, bool]()
+
+    def is_fixed(part: sp.Basic) -> bool:
+        """Whether parameters alone stand in it; parts that stand in many others are looked at once."""
+        if part not in known:
+            known[part] = all(is_fixed(a) for a in part.args) if part.args else part.free_symbols <= parameters
+        return known[part]
+
+    for part in parts_of(expression):
+        if is_fixed(part):
             continue
         if isinstance(part, sp.Pow) and not (part.exp.is_number and part.exp.is_positive):
             found.add("a quotient" if part.exp.is_number else "a power")

@@ -121,6 +121,10 @@ class UserFunction(Kernel):
         """Its results at these arguments, as SymPy expressions."""
         return [function(*arguments) for function in self.functions]
 
+    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+        """The derivative of one result by its argument number k, from 0."""
+        return self._derivative().functions[place * len(arguments) + k](*arguments)
+
 
 class Result(sp.Function):
     """One result of a function of the user; `kernel` is the function, `place` counts its results from 0."""
@@ -135,8 +139,7 @@ class Result(sp.Function):
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """The derivative by an argument, counted from 1."""
-        derivative = self.kernel._derivative()
-        return derivative.functions[self.place * len(self.args) + argindex - 1](*self.args)
+        return self.kernel.slope(self.place, argindex - 1, self.args)
 
     def _eval_evalf(self, prec: int) -> Any:
         """Its number where all arguments are numbers."""

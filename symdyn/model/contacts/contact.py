@@ -124,12 +124,6 @@ class Contact:
         if planar != isinstance(b, Curve) and isinstance(b, (Curve, Surface)):
             found.append(f"{self.where}: a {kind_b} belongs to a {'spatial' if planar else 'planar'} system; pass a "
                          f"{'Curve' if planar else 'Surface'}")
-        if isinstance(a, (Disc, Torus, Cylinder)) and not isinstance(b, Plane):
-            what = "surface" if isinstance(a, Torus) else "edge"
-            found.append(f"{self.where}: the {what} of a {kind_a} touches a Plane, found a {kind_b} on body b; pass a Plane")
-        if isinstance(a, Sphere) and isinstance(b, (Curve, Surface)):
-            found.append(f"{self.where}: a {kind_b} is touched by points; pass a Point or a Box, or the curve at the distance of "
-                         "the radius")
         if isinstance(a, Box) and length_of(a.size) not in ((2,) if planar else (3,)):
             found.append(f"{self.where}: size is {shown(a.size)}; pass {'two' if planar else 'three'} lengths")
         return found

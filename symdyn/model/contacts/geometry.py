@@ -15,15 +15,23 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from symdyn.errors import UnsupportedExpression
 from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.grid import GridSpline, grid_spline_of
 from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface, Torus
+from symdyn.model.contacts.touching import Implicit, circle_of_points, touching_of
 from symdyn.model.faults import Faults
 from symdyn.model.quantity import Measure, Place, Quantity
+from symdyn.model.symbols import Moving, time
 
 Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
 
 # Square of a distance from the middle of a bore, m^2, below which the normal loses its direction.
 CENTRED = sp.Rational(1, 10**30)
+# Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
+AROUND = 12
+BESIDE = (-0.95, -0.7, -0.45, -0.2, 0.2, 0.45, 0.7, 0.95)
+RINGS = ((0.4, 6), (0.8, 8))
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,18 @@ class Touch:
     tangents: tuple[Triple, ...]
 
 
+@dataclass(frozen=True)
+class Round:
+    """A shape that touches a curve or surface by its curvature: a sphere, or a circle with a tube around it.
+
+    axis   of the circle, body axes; None of a sphere
+    """
+
+    radius: sp.Expr
+    axis: Triple | None = None
+    tube: sp.Expr = sp.S.Zero
+
+
 class Geometry:
     """Expressions of one contact.
 
@@ -53,6 +73,7 @@ class Geometry:
     def __init__(self, contact: Contact, planar: bool, fixed: bool, faults: Faults) -> None:
         self.contact, self.planar, self.fixed, self.faults = contact, planar, fixed, faults
         self.a, self.b = (str(getattr(body, "name", body)) for body in (contact.a, contact.b))
+        self._spline = grid_spline_of(f"{contact.name}_height", getattr(contact.on_b, "height", None))
 
     def touches(self) -> list[Touch]:
         """The places of the contact, each with its expressions."""
@@ -121,20 +142,35 @@ class Geometry:
             normal = _scaled(arm, -1 / distance)
             tangents = self._tangents(normal)
         else:
-            gap, normal, tangents = self._from_graph(other, place)
+            return self._above_graph(name, at, None if radius == 0 else Round(radius))
         return Touch(name, at, _scaled(normal, -radius), gap - radius, normal, tangents)
 
     def _edge(self, name: str, center: Place, axis: Triple, radius: sp.Expr, tube: sp.Expr = sp.S.Zero) -> Touch:
-        """The lowest point of a circle above a plane: from the centre -r (n - (n e) e)/sqrt(1 - (n e)^2); that of a tube around
-        the circle is further by -tube n."""
-        plane = self.contact.on_b
-        assert isinstance(plane, Plane)
-        gap, normal, tangents = self._from_plane(plane, self._position(self.a, center))
-        e = self._turned(self.a, axis)
-        along = _dot(normal, e)
-        steep = sp.sqrt(1 - along**2)
-        lever = _add(_scaled(_add(normal, _scaled(e, along), -1), -radius / steep), _scaled(normal, tube), -1)
-        return Touch(name, center, lever, gap - radius * steep - tube, normal, tangents)
+        """A circle, with a tube around it, against what body b has."""
+        other = self.contact.on_b
+        if isinstance(other, (Sphere, Bore)):
+            return self._edge_and_sphere(name, center, axis, radius, tube)
+        if isinstance(other, Surface):
+            return self._above_graph(name, center, Round(radius, axis, tube))
+        assert isinstance(other, Plane)
+        gap, normal, tangents = self._from_plane(other, self._position(self.a, center))
+        lever = _lowest(Round(radius, self._turned(self.a, axis), tube), normal)
+        return Touch(name, center, lever, gap + _dot(normal, lever), normal, tangents)
+
+    def _edge_and_sphere(self, name: str, center: Place, axis: Triple, radius: sp.Expr, tube: sp.Expr) -> Touch:
+        """The point of a circle that is nearest to the centre of a sphere, in a bore the one that is furthest from it: along what
+        is across the axis of the arm between the centres."""
+        other, e = self.contact.on_b, self._turned(self.a, axis)
+        inside = isinstance(other, Bore)
+        arm = _add(self._position(self.a, center), self._position(self.b, self._vector(other.center, "center on b")), -1)
+        across = _add(arm, _scaled(e, _dot(arm, e)), -1)
+        to_circle = _scaled(across, (radius if inside else -radius) / sp.sqrt(_dot(across, across)))
+        reach = _add(arm, to_circle)
+        distance = sp.sqrt(_dot(reach, reach))
+        normal = _scaled(reach, (-1 if inside else 1) / distance)
+        of_b = self._number(other.radius, "radius on b")
+        gap = (of_b - distance if inside else distance - of_b) - tube
+        return Touch(name, center, _add(to_circle, _scaled(normal, tube), -1), gap, normal, self._tangents(normal))
 
     def _from_plane(self, plane: Plane, place: Triple) -> tuple[sp.Expr, Triple, tuple[Triple, ...]]:
         default = (0, 1, 0) if self.planar else (0, 0, 1)
@@ -148,29 +184,89 @@ class Geometry:
         own = ((unit[1], -unit[0], sp.S.Zero),) if self.planar else _across(unit)
         return gap, self._turned(self.b, unit), tuple(self._turned(self.b, t) for t in own)
 
-    def _from_graph(self, graph: Any, place: Triple) -> tuple[sp.Expr, Triple, tuple[Triple, ...]]:
-        """Above a curve or surface of body b."""
-        arm = _add(place, self._position(self.b, (sp.S.Zero,) * 3), -1)
-        local = arm if self._still(self.b) else tuple(_dot(column, arm) for column in self._columns(self.b))
-        spline = isinstance(graph, Curve) and isinstance(graph.x, sp.Symbol) and _is_spline(graph.height)
-        height = _polynomials(graph.height, graph.x) if spline else self.faults.expression(
-            graph.height, f"{self.contact.where}: height")
-        symbols = [graph.x] if isinstance(graph, Curve) else [graph.x, graph.y]
-        if not all(isinstance(s, sp.Symbol) for s in symbols):
-            self.faults.append(f"{self.contact.where}: the curve's abscissa is {symbols}; pass the symbols that its height is "
-                               "written in")
-            return local[1], (sp.S.Zero, sp.S.One, sp.S.Zero), ()
-        at = dict(zip(symbols, local, strict=False))
-        slopes = [height.diff(s).xreplace(at) for s in symbols]
-        size = sp.sqrt(1 + sum(s**2 for s in slopes))
-        if isinstance(graph, Surface):
-            normal = (-slopes[0] / size, -slopes[1] / size, 1 / size)
-            tangents = self._tangents(normal)
-        else:
-            normal = (-slopes[0] / size, 1 / size, sp.S.Zero)
-            tangents = ((normal[1], -normal[0], sp.S.Zero),)
-        gap = (local[len(symbols)] - height.xreplace(at)) / size
-        return gap, self._turned(self.b, normal), tuple(self._turned(self.b, t) for t in tangents)
+    def _above_graph(self, name: str, at: Place, shape: Round | None) -> Touch:
+        """A point, or what is round about it, above a curve or surface of body b."""
+        graph: Any = self.contact.on_b
+        symbols = (graph.x,) if isinstance(graph, Curve) else (graph.x, graph.y)
+        height = self._height(graph, symbols)
+        if height is None:
+            zero = (sp.S.Zero,) * 3
+            return Touch(name, at, zero, sp.S.Zero, (sp.S.Zero, sp.S.One, sp.S.Zero), ())
+        local = self._in_b(_add(self._position(self.a, at), self._position(self.b, (sp.S.Zero,) * 3), -1))
+        n = len(symbols)
+        touching: tuple[sp.Expr, ...] = local[:n]
+        if shape is not None:
+            if shape.axis is not None:
+                shape = Round(shape.radius, self._in_b(self._turned(self.a, shape.axis)), shape.tube)
+            touching, height = self._touching(symbols, height, local[:n], shape)
+        normal, size = _normal(symbols, height)
+        at_point = dict(zip(symbols, touching, strict=True))
+        normal, size = tuple(e.xreplace(at_point) for e in normal), size.xreplace(at_point)
+        lever = (sp.S.Zero,) * 3 if shape is None else _lowest(shape, normal)
+        gap = (local[n] + lever[n] - height.xreplace(at_point)) / size
+        tangents = ((normal[1], -normal[0], sp.S.Zero),) if self.planar else self._tangents(normal)
+        return Touch(name, at, self._turned(self.b, lever), gap, self._turned(self.b, normal),
+                     tuple(self._turned(self.b, t) for t in tangents))
+
+    def _height(self, graph: Any, symbols: Sequence[Any]) -> sp.Expr | None:
+        """f of a curve or surface; None, with faults, where there is none."""
+        where, before = self.contact.where, len(self.faults)
+        if not all(isinstance(s, sp.Symbol) for s in symbols) or len(set(symbols)) < len(symbols):
+            self.faults.append(f"{where}: the abscissa of a {type(graph).__name__} is {symbols}; pass the symbols that its "
+                               "height is written in")
+            return None
+        if isinstance(graph, Curve) and _is_spline(graph.height):
+            return _polynomials(graph.height, graph.x)
+        if isinstance(graph, Surface) and self._spline is not None:
+            return self._spline.at(graph.x, graph.y)
+        height = self.faults.expression(graph.height, f"{where}: height")
+        moving = sorted(str(s) for s in height.free_symbols - set(symbols) if isinstance(s, Moving) or s == time)
+        if moving:
+            self.faults.append(f"{where}: the height depends on {', '.join(moving)}; a {type(graph).__name__} is fixed to its "
+                               "body: write it by its abscissa and parameters, and let the body move")
+        return height if len(self.faults) == before else None
+
+    def _touching(self, symbols: Sequence[sp.Symbol], height: sp.Expr, center: Sequence[sp.Expr],
+                  shape: Round) -> tuple[tuple[sp.Expr, ...], sp.Expr]:
+        """Where a shape touches, along x (and y) of body b, and the height with the functions that it calls."""
+        parameters = sorted(height.free_symbols - set(symbols), key=lambda s: s.name)
+        n = len(symbols)
+        axis = () if shape.axis is None else shape.axis
+        tube = [shape.tube] * (shape.tube != 0)
+        given = (*center, shape.radius, *tube, *axis, *parameters)
+        names = [*["c_x", "c_y"][:n], "radius", *["tube"][:len(tube)], *["e_x", "e_y", "e_z"][:len(axis)],
+                 *[f"parameter_{k + 1}" for k in range(len(parameters))]]
+        known = tuple(sp.Symbol(name, real=True) for name in names)
+        unknowns = tuple(sp.Symbol(name, real=True) for name in ("s_x", "s_y")[:n])
+
+        def implicit(spline: GridSpline | None) -> Implicit:
+            f = height if spline is None else spline.at(*symbols)
+            f = f.xreplace(dict(zip((*symbols, *parameters), (*unknowns, *known[len(known) - len(parameters):]), strict=True)))
+            normal, _ = _normal(unknowns, f)
+            own = Round(known[n], known[-len(parameters) - 3:len(known) - len(parameters)] if axis else None,
+                        known[n + 1] if tube else sp.S.Zero)
+            lever = _lowest(own, normal)
+
+            def value(offset: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+                there = [c + o for c, o in zip(known, offset[:n], strict=False)]
+                return (*there, offset[n] - f.xreplace(dict(zip(unknowns, there, strict=True))))
+
+            residual = tuple(s - c - o for s, c, o in zip(unknowns, known, lever, strict=False))
+            others = [value(offset) for offset in _other_points(own, lever, normal, n)]
+            return Implicit(unknowns, known, own.radius + own.tube, lever[n] - f, residual, tuple(others))
+
+        what = f"contact {self.contact.name}: the {'surface' if n == 2 else 'curve'}"
+        try:
+            found, spline = touching_of(f"{self.contact.name}_touching", what, implicit,
+                                        self._spline if n == 2 else None)
+        except UnsupportedExpression as error:
+            self.faults.append(f"{self.contact.where}: {error}")
+            return tuple(center), height
+        return tuple(found.applied(given)), height if spline is None else spline.at(*symbols)
+
+    def _in_b(self, v: Triple) -> Triple:
+        """A vector of the n-frame in the axes of body b."""
+        return v if self._still(self.b) else tuple(_dot(column, v) for column in self._columns(self.b))
 
     def _tangents(self, n: Triple) -> tuple[Triple, ...]:
         """Across a normal that turns: in space without a singularity but n = -z.
@@ -223,6 +319,37 @@ class Geometry:
 
     def _vector(self, value: Any, what: str) -> Triple:
         return tuple(self.faults.vector(value, f"{self.contact.where}: {what}", self.planar))
+
+
+def _lowest(shape: Round, normal: Sequence[sp.Expr]) -> Triple:
+    """From the centre to the point that is furthest against a normal: -r n of a sphere, -r (n - (n e) e)/sqrt(1 - (n e)^2) of a
+    circle, further by -tube n with a tube around it."""
+    if shape.axis is None:
+        return _scaled(normal, -shape.radius)
+    along = _dot(normal, shape.axis)
+    in_plane = _add(normal, _scaled(shape.axis, along), -1)
+    return _add(_scaled(in_plane, -shape.radius / sp.sqrt(1 - along**2)), _scaled(normal, shape.tube), -1)
+
+
+def _normal(symbols: Sequence[sp.Symbol], height: sp.Expr) -> tuple[Triple, sp.Expr]:
+    """The unit normal of y = f(x) or z = f(x, y), and sqrt(1 + f'^2)."""
+    slopes = [height.diff(s) for s in symbols]
+    size = sp.sqrt(1 + sp.Add(*[s**2 for s in slopes]))
+    entries = [*[-s / size for s in slopes], 1 / size, sp.S.Zero]
+    return (entries[0], entries[1], entries[2]), size
+
+
+def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[tuple[sp.Expr, ...]]:
+    """Points of a shape from its centre, along x (and y) and upwards."""
+    if shape.axis is not None:
+        to_circle = _add(lever, _scaled(normal, shape.tube))
+        turned = _cross(shape.axis, to_circle)
+        return [_add(_add(_scaled(to_circle, c), _scaled(turned, s)), _scaled(normal, shape.tube), -1)
+                for c, s in ((sp.Float(c), sp.Float(s)) for c, s in circle_of_points(AROUND)[1:])]
+    if n == 1:
+        return [(sp.Float(k) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius) for k in BESIDE]
+    return [(sp.Float(k * c) * shape.radius, sp.Float(k * s) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius)
+            for k, count in RINGS for c, s in circle_of_points(count)]
 
 
 def _is_spline(value: Any) -> bool:
