@@ -60,10 +60,9 @@ def texts(functions: Sequence[UserFunction], backend: str, name: str) -> list[Us
     for f in functions:
         text = f.text(backend)
         if text is None:
-            way = _WAYS.get(backend, f"texts={{{backend!r}: ...}}")
+            way = f"pass {_WAYS.get(backend, f'texts={{{backend!r}: ...}}')} to sd.External, or " if f.given else ""
             there = ", ".join(b for b, _ in f.texts)
-            raise SymdynError(f"{f.signature} has no text for the backend {backend}, only for {there}; "
-                              f"pass {way} to sd.External, or take another backend")
+            raise SymdynError(f"{f.signature} has no text for the backend {backend}, only for {there}; {way}take another backend")
         if f.label.startswith(f"{name}_"):
             raise SymdynError(f"the function {f.label} may have a name of the generated files of {name}; take one that does "
                               f"not begin with {name}_")

@@ -39,6 +39,8 @@ class UserFunction(Kernel):
     numbers: Callable[..., Any] | None = field(compare=False)
     digits: Callable[..., Any] | None = field(compare=False)
 
+    given = True  # by the user, and not made of what a contact touches
+
     @property
     def n_out(self) -> int:
         return self.results
@@ -109,6 +111,9 @@ class UserFunction(Kernel):
                                         f"{_numbers(self.results * len(self.arguments))}")
         return self.derivative
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "functions"}  # classes that no module has
+
     @cached_property
     def functions(self) -> tuple[type[Result], ...]:
         """For each result the SymPy function that stands for it."""
@@ -137,6 +142,9 @@ class Result(sp.Function):
     def _should_evalf(cls, arg: Any) -> int:
         return -1  # a number among the arguments does not make a number of it
 
+    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+        return _result_at, (self.kernel, self.place, self.args)
+
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """The derivative by an argument, counted from 1."""
         return self.kernel.slope(self.place, argindex - 1, self.args)
@@ -159,6 +167,10 @@ class Result(sp.Function):
 
     def _pretty(self, printer: Any) -> Any:
         return printer._print_Function(self)
+
+
+def _result_at(kernel: UserFunction, place: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+    return kernel.functions[place](*arguments)
 
 
 def _arrays(n: int) -> str:

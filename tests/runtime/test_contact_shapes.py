@@ -1,17 +1,22 @@
 """Gaps, normals and rows of contacts against brute force: the nearest of many points, and differences along a motion."""
 
+import pickle
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.interpolate import CubicSpline, RectBivariateSpline
+from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import symdyn as sd
+from symdyn.errors import ModelError, SimulationWarning
+from symdyn.model.contacts.grid import grid_spline_of
+from symdyn.pipeline import emit
 from symdyn.runtime.integrating.contacts import numbers
 
 Shapes = sd.contacts
@@ -189,3 +194,122 @@ def test_a_road_given_as_a_spline_is_that_of_its_polynomials() -> None:
         found = module.simulate((0, 0.6), q=[x, 1.0, 0], u=[speed, 0, 0], rtol=1e-12).contacts["sole"].impacts.t[0]
         expected = brentq(lambda t, x=x, speed=speed: 1 - 5 * t**2 - road(x + speed * t), 0.2, 0.6, xtol=1e-14)
         assert found == pytest.approx(expected, abs=1e-12)
+
+
+def wheel(pair: Any, **law: Any) -> Any:
+    """A circle of radius 0.2 m that touches the ground by a pair of shapes."""
+    system = sd.System("circle", gravity=[0, -9.81])
+    body = system.add_body("body", mass=1.0, inertia=0.016)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_contact(sd.Contact("touch", body, system.ground, shape=pair, **law))
+    return system.compile()
+
+
+def ball(pair: Any, **law: Any) -> sd.System:
+    system = sd.System("ball", gravity=[0, 0, -9.81])
+    body = system.add_body("body", mass=1.0, inertia=[0.016, 0.016, 0.02])
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.Contact("touch", body, system.ground, shape=pair, **law))
+    return system
+
+
+BOWL = 2 - sp.sqrt(4 - X**2)
+SPHERE = Shapes.Sphere(0.2)
+SAME = {
+    "a circle in a bowl": (Shapes.Curve(BOWL, X), Shapes.Bore(2, [0, 2]), {"friction": 0.05, "restitution": 0.5}, [-0.9, 0.9, 0]),
+    "a circle on a hill": (Shapes.Curve(-BOWL, X), Shapes.Sphere(2, [0, -2]), {"friction": 0.3},
+                           [0.1, np.sqrt(2.2**2 - 0.1**2) - 2, 0]),
+    "a circle on a slope": (Shapes.Curve(-X / 3, X), Shapes.Plane([1 / 3, 1]), {"friction": 0.3, "restitution": 0.5}, [0, 1, 0])}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_a_circle_on_a_curve_moves_as_on_the_shape_that_the_curve_is(name: str) -> None:
+    curve, shape, law, start = SAME[name]
+    runs = [wheel((SPHERE, other), **law).simulate((0, 1), q=start, rtol=1e-11) for other in (curve, shape)]
+    assert len(runs[0].contacts["touch"].impacts.t) == len(runs[1].contacts["touch"].impacts.t)
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-9
+    assert np.abs(runs[0].contacts["touch"].force - runs[1].contacts["touch"].force).max() < 1e-8
+
+
+def test_shapes_in_space_move_on_surfaces_as_on_the_shapes_that_these_are() -> None:
+    """A ball in a bowl; a tyre that falls on a slope, given as a spline over a grid and as a plane."""
+    bowl = Shapes.Surface(2 - sp.sqrt(4 - X**2 - Y**2), X, Y)
+    rolls: dict[str, Any] = {"q": [-0.9, 0.1, 0.9, 1, 0, 0, 0], "u": [0, 0.5, 0, 0, 0, 3.0], "rtol": 1e-11}
+    round_ones = (bowl, Shapes.Bore(2, [0, 0, 2]))
+    runs = [ball((SPHERE, other), friction=0.3).compile().simulate((0, 0.5), **rolls) for other in round_ones]
+    assert [mode for _, mode in runs[0].contacts["touch"].switches] == ["open", "sticking"]
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-9
+    spline = RectBivariateSpline(GRID, GRID, GRID[:, None] / 5 + GRID / 10)
+    falls: dict[str, Any] = {"q": [0, 0, 0.4, np.cos(0.4), np.sin(0.4), 0, 0], "u": [0, 0.5, 0, 3, 2, 1], "rtol": 1e-11}
+    others = (Shapes.Plane([-1 / 5, -1 / 10, 1]), Shapes.Surface(spline, X, Y))
+    tyre = Shapes.Torus(0.15, 0.05)
+    plane, run = [ball((tyre, other), friction=0.3).compile().simulate((0, 0.4), **falls) for other in others]
+    assert plane.contacts["touch"].mode[-1] != "open"
+    assert np.abs(run.x - plane.x).max() < 1e-10
+
+
+def test_a_road_keeps_the_energy_of_what_slides_on_it_and_its_module_travels() -> None:
+    """Without friction; the road is a spline, whose third derivative jumps at its knots, and the module a copy."""
+    along = np.linspace(-3, 3, 13)
+    module = wheel((SPHERE, Shapes.Curve(CubicSpline(along, 0.1 * np.cos(2 * along)), X)))
+    module = pickle.loads(pickle.dumps(module))
+    solution = module.simulate((0, 2), q=[0.2, 0.35, 0], u=[1, 0, 0], rtol=1e-11)
+    closed = solution.contacts["touch"].mode == "sliding"
+    assert closed[-1] and closed.sum() > 500
+    assert np.ptp(solution.energy[closed]) < 1e-8
+    assert np.abs(solution.contacts["touch"].gap[closed]).max() < 1e-9
+
+
+def test_what_is_wider_than_a_hollow_is_reported_where_it_touches_twice() -> None:
+    module = wheel((SPHERE, Shapes.Curve(sp.sqrt(X**2 + sp.Rational(1, 10000)), X)))
+    start = [-0.5, 1.2, 0]
+    with pytest.warns(SimulationWarning, match="contact touch is closed, and its shape touches in another place, too"):
+        stopped = module.simulate((0, 2), q=start, rtol=1e-9)
+    assert abs(stopped["x"][-1]) < 1e-3 and stopped["x"][-2] < 0
+
+
+def ramp(order: int) -> sd.External:
+    name = f"ramp_{order}"
+    text = f"static int {name}(const double *in, double *out) {{ out[0] = {order} ? {order} < 2 : in[0]; return 0; }}"
+    return sd.External(name, ["x"], c=text, derivative=ramp(order + 1) if order < 3 else None)
+
+
+RAMP = ramp(0)
+
+
+@pytest.mark.parametrize(("graph", "message"), [
+    (Shapes.Surface(X * sd.t, X, Y), r"contact 'touch': the height depends on t; a Surface is fixed to its body"),
+    (Shapes.Surface(sp.Mod(X, 3), X, Y), r"the height Mod\(X, 3\) has no slope everywhere; leave out what jumps"),
+    (Shapes.Surface(X, X, X), r"the abscissa of a Surface is X, X; pass the symbols that its height is written in"),
+    (Shapes.Surface("X", X, Y), r"height is the text 'X'; text is never evaluated"),
+    (Shapes.Surface(RAMP(X), X, Y),
+     r"the height calls ramp_.\(x\), which a round shape does not go with")])
+def test_heights_that_cannot_be_are_rejected(graph: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        ball((SPHERE, graph)).check()
+
+
+def test_languages_that_a_touching_point_has_no_text_for_are_reported() -> None:
+    equations = ball((SPHERE, Shapes.Surface(WAVES, X, Y))).embedding()
+    with pytest.raises(sd.SymdynError, match=r"touch_touching\(c_x, c_y, radius\) has no text for the backend fortran"):
+        emit(equations, "fortran", ["rhs"])
+
+
+def test_a_spline_over_a_grid_is_that_of_scipy() -> None:
+    """Its values and derivatives, in doubles and in 30 digits, also by NdBSpline; beyond its ends the polynomials go on."""
+    stream = np.random.default_rng(1)
+    rough = RectBivariateSpline(np.linspace(-1, 2, 9), np.linspace(0, 1, 7), stream.normal(size=(9, 7)), kx=3, ky=2)
+    function = grid_spline_of("road", rough)
+    assert function is not None
+    x, y = stream.uniform(-1, 2, 20), stream.uniform(0, 1, 20)
+    for orders in ((0, 0), (1, 0), (0, 1), (2, 1)):
+        expected = rough(x, y, *orders, grid=False)
+        assert np.abs(function.rows([x, y, *orders])[:, 0] - expected).max() < 1e-11
+        exact = function.precise(mpmath.mp, [mpmath.mpf(x[0]), mpmath.mpf(y[0]), *orders])[0]
+        assert float(exact) == pytest.approx(expected[0], abs=1e-12)
+    knots, coefficients = rough.get_knots(), rough.get_coeffs().reshape(9, 7)
+    other = NdBSpline(knots, coefficients, (3, 2))
+    again = grid_spline_of("road", other)
+    assert again is not None and again.texts == function.texts
+    assert function.rows([3.0, 0.5, 0, 0])[0] == pytest.approx(other([[3.0, 0.5]])[0], rel=1e-12)
+    assert grid_spline_of("road", CubicSpline([0, 1, 2], [0, 1, 0])) is None

@@ -13,6 +13,7 @@ Complementarity Problem, section 3.3.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -25,6 +26,9 @@ from symdyn.spatial.vectors import vector, zeros
 from symdyn.tape.differentiate import jacobian
 from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
+
+# A closed contact whose gap is more than this part of its width touches elsewhere.
+FAR = Fraction(1, 1000)
 
 
 class ContactRows:
@@ -89,7 +93,22 @@ class ContactRows:
             x = factors.solve(b)
             if n > 1:  # rows that depend on each other are softened, which a second step undoes in what the rows determine
                 x = x + factors.solve(b - A @ x)
-            return dict(zip(self.forces, a.name("contact_force", H @ x + fixed), strict=True))
+            forces = self._in_one_place(a.name("contact_force", H @ x + fixed), held)
+            return dict(zip(self.forces, forces, strict=True))
+
+    def _in_one_place(self, forces: np.ndarray, held: Sequence[Any]) -> np.ndarray:
+        """Forces, which hold a round shape on a curve or surface as long as it touches in the place that they act at."""
+        recorder, first = self.algebra.recorder, 0
+        for c in self.contacts:
+            if c.width is not None:
+                gap, width = self.algebra.expression(c.gap), self.algebra.expression(c.width)
+                margin = FAR * width - held[first] * recorder.apply("abs", gap)
+                reason = (f"contact {c.name} is closed, and its shape touches in another place, too: it is wider than a hollow; "
+                          "one contact is in one place at a time; make the curve or surface smoother")
+                for k in range(first, first + len(c.rows)):
+                    forces[k] = recorder.guard(forces[k], margin, reason)
+            first += len(c.rows)
+        return forces
 
     def gaps(self) -> np.ndarray:
         """[gap, static, kinetic, restitution of each contact; slips], as time stepping takes them."""

@@ -23,11 +23,14 @@ from symdyn.model.contacts.touching import Implicit, circle_of_points, touching_
 from symdyn.model.faults import Faults
 from symdyn.model.quantity import Measure, Place, Quantity
 from symdyn.model.symbols import Moving, time
+from symdyn.shown import shown
 
 Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
 
 # Square of a distance from the middle of a bore, m^2, below which the normal loses its direction.
 CENTRED = sp.Rational(1, 10**30)
+# What heights are written in: real, and of names that no parameter has.
+REAL = (sp.Symbol("abscissa x", real=True), sp.Symbol("abscissa y", real=True))
 # Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
 AROUND = 12
 BESIDE = (-0.95, -0.7, -0.45, -0.2, 0.2, 0.45, 0.7, 0.95)
@@ -41,6 +44,7 @@ class Touch:
     name       of the contact, with a number where a shape has several
     at         the point of body a that the force is applied from, body axes; lever: from there to the place, n-frame
     gap        m; normal, tangents: n-frame
+    width      of a shape that may touch in several places, m; None of others
     """
 
     name: str
@@ -49,6 +53,7 @@ class Touch:
     gap: sp.Expr
     normal: Triple
     tangents: tuple[Triple, ...]
+    width: sp.Expr | None = None
 
 
 @dataclass(frozen=True)
@@ -187,13 +192,12 @@ class Geometry:
     def _above_graph(self, name: str, at: Place, shape: Round | None) -> Touch:
         """A point, or what is round about it, above a curve or surface of body b."""
         graph: Any = self.contact.on_b
-        symbols = (graph.x,) if isinstance(graph, Curve) else (graph.x, graph.y)
+        symbols = REAL[:1] if isinstance(graph, Curve) else REAL
         height = self._height(graph, symbols)
-        if height is None:
-            zero = (sp.S.Zero,) * 3
-            return Touch(name, at, zero, sp.S.Zero, (sp.S.Zero, sp.S.One, sp.S.Zero), ())
         local = self._in_b(_add(self._position(self.a, at), self._position(self.b, (sp.S.Zero,) * 3), -1))
         n = len(symbols)
+        if height is None:
+            height = sp.S.Zero
         touching: tuple[sp.Expr, ...] = local[:n]
         if shape is not None:
             if shape.axis is not None:
@@ -206,24 +210,30 @@ class Geometry:
         gap = (local[n] + lever[n] - height.xreplace(at_point)) / size
         tangents = ((normal[1], -normal[0], sp.S.Zero),) if self.planar else self._tangents(normal)
         return Touch(name, at, self._turned(self.b, lever), gap, self._turned(self.b, normal),
-                     tuple(self._turned(self.b, t) for t in tangents))
+                     tuple(self._turned(self.b, t) for t in tangents),
+                     None if shape is None else shape.radius + shape.tube)
 
-    def _height(self, graph: Any, symbols: Sequence[Any]) -> sp.Expr | None:
-        """f of a curve or surface; None, with faults, where there is none."""
-        where, before = self.contact.where, len(self.faults)
-        if not all(isinstance(s, sp.Symbol) for s in symbols) or len(set(symbols)) < len(symbols):
-            self.faults.append(f"{where}: the abscissa of a {type(graph).__name__} is {symbols}; pass the symbols that its "
+    def _height(self, graph: Any, symbols: Sequence[sp.Symbol]) -> sp.Expr | None:
+        """f of a curve or surface, in these symbols; None, with faults, where there is none."""
+        where, before, kind = self.contact.where, len(self.faults), type(graph).__name__
+        given = [graph.x] if isinstance(graph, Curve) else [graph.x, graph.y]
+        if not all(isinstance(s, sp.Symbol) for s in given) or len(set(given)) < len(given):
+            self.faults.append(f"{where}: the abscissa of a {kind} is {', '.join(map(shown, given))}; pass the symbols that its "
                                "height is written in")
             return None
         if isinstance(graph, Curve) and _is_spline(graph.height):
-            return _polynomials(graph.height, graph.x)
+            return _polynomials(graph.height, symbols[0])
         if isinstance(graph, Surface) and self._spline is not None:
-            return self._spline.at(graph.x, graph.y)
-        height = self.faults.expression(graph.height, f"{where}: height")
-        moving = sorted(str(s) for s in height.free_symbols - set(symbols) if isinstance(s, Moving) or s == time)
+            return self._spline.at(*symbols)
+        height = self.faults.expression(graph.height, f"{where}: height").xreplace(dict(zip(given, symbols, strict=True)))
+        moving = sorted(str(s) for s in height.free_symbols if isinstance(s, Moving) or s == time)
         if moving:
-            self.faults.append(f"{where}: the height depends on {', '.join(moving)}; a {type(graph).__name__} is fixed to its "
-                               "body: write it by its abscissa and parameters, and let the body move")
+            self.faults.append(f"{where}: the height depends on {', '.join(moving)}; a {kind} is fixed to its body: write it by "
+                               "its abscissa and parameters, and let the body move")
+        rough = {part for s in symbols for part in height.diff(s).atoms(sp.Derivative, sp.Subs, sp.DiracDelta)}
+        if rough:
+            self.faults.append(f"{where}: the height {shown(graph.height)} has no slope everywhere; leave out what jumps, such "
+                               "as Mod, floor and sign")
         return height if len(self.faults) == before else None
 
     def _touching(self, symbols: Sequence[sp.Symbol], height: sp.Expr, center: Sequence[sp.Expr],

@@ -36,6 +36,8 @@ class GridSpline(UserFunction):
     degrees: tuple[int, int] = field(compare=False)
     coefficients: tuple[tuple[float, ...], ...] = field(compare=False)
 
+    given = False
+
     def at(self, x: sp.Expr, y: sp.Expr) -> sp.Expr:
         """Its value as an expression."""
         return self.applied([x, y, sp.S.Zero, sp.S.Zero])[0]

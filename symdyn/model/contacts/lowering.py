@@ -52,6 +52,7 @@ class RigidContact:
     kind      BODIES, or that of the element of joints
     at, acting   where it touches and the force on body a, n-frame; empty of an element of joints
     lengths   parameters that are radii and lengths of its shapes
+    width     of a shape that may touch in several places, m; None of others
     """
 
     name: str
@@ -71,6 +72,7 @@ class RigidContact:
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
     lengths: tuple[str, ...] = ()
+    width: sp.Expr | None = None
 
     @property
     def normal(self) -> bool:
@@ -181,7 +183,8 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
     system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
                                               tuple(events), at=geometry.place(touch), acting=_along(directions, forces),
-                                              lengths=tuple(s.name for s in contact.lengths.values() if s.is_Symbol)))
+                                              lengths=tuple(s.name for s in contact.lengths.values() if s.is_Symbol),
+                                              width=touch.width))
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
         system.events.append(Event(f"{name}_{what}", value, 1 if what == IGNORED else -1, True, ()))

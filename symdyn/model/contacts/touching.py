@@ -61,6 +61,9 @@ class Implicit:
     residual: tuple[sp.Expr, ...]
     others: tuple[tuple[sp.Expr, ...], ...]
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "recorded"}  # made again where it is needed
+
     @cached_property
     def recorded(self) -> Recorded:
         """The same on a tape of its own."""
@@ -98,6 +101,8 @@ class Touching(UserFunction):
     """s of the centre and of what else the equations depend on; see the module. It fails where there is no such point."""
 
     implicit: Implicit = field(compare=False)
+
+    given = False
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
         found, _ = symdyn_each(lambda at: self._solved(_Doubles(), at, CLOSE), self.results, values)
