@@ -1,12 +1,15 @@
 """Stronge's energetic restitution of an impact with friction, against closed forms."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import symdyn as sd
-from symdyn.errors import ModelError, SimulationWarning
+from symdyn.errors import SimulationWarning
 from symdyn.runtime.contact_laws import SLIDING, STICKING, Site
 from symdyn.runtime.stronge import stronge
 
@@ -81,6 +84,81 @@ def test_random_impacts_are_those_of_small_steps_and_lose_energy() -> None:
         assert one.w == pytest.approx(in_small_steps(D, v, e, mu, 1e-4), abs=2e-2)
 
 
+def turned(angle: float) -> np.ndarray:
+    """About the normal."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def test_an_impact_in_space_whose_slip_stays_in_a_plane_is_that_in_the_plane() -> None:
+    stream = np.random.default_rng(3)
+    for _ in range(30):
+        D, mu, e = rod(stream.uniform(0.1, 1.5)), stream.uniform(0, 2), stream.uniform(0, 1)
+        v, R = np.array([-1.0, stream.uniform(-2, 2)]), turned(stream.uniform(0, 6))
+        in_plane = stronge(D, v, e, Site((0, 1), mu, mu))
+        in_space = stronge(R @ np.pad(D, (0, 1)) @ R.T + R @ np.diag([0, 0, 1.3]) @ R.T, R @ [*v, 0], e, Site((0, 1, 2), mu, mu))
+        assert in_plane is not None and in_space is not None
+        assert R.T @ in_space.w == pytest.approx([*in_plane.w, 0], abs=1e-12)
+        assert R.T @ in_space.lam == pytest.approx([*in_plane.lam, 0], abs=1e-12)
+        assert in_space.modes[0].kind == in_plane.modes[0].kind
+
+
+def test_the_central_impact_of_a_ball_in_space_is_a_closed_form() -> None:
+    """The normal does not feel friction; the slip keeps its direction, and stops where 7/2 mu (1 + e) v_N is enough."""
+    D, e, slip = np.diag([1.0, 3.5, 3.5]), 0.7, np.array([0.6, -0.8])
+    for mu, left in ((0.1, 1 - 3.5 * 0.1 * 1.7), (0.3, 0.0)):
+        one = stronge(D, np.array([-1.0, *slip]), e, Site((0, 1, 2), mu, mu))
+        assert one is not None and one.modes[0].kind == (SLIDING if left else STICKING)
+        assert one.w == pytest.approx([e, *(left * slip)], abs=1e-13)
+        assert one.lam[0] == pytest.approx(1 + e, rel=1e-13)
+
+
+def followed(D: np.ndarray, v: np.ndarray, e: float, mu: float) -> np.ndarray | None:
+    """Velocities after an impact in which the slip does not stop, by an implicit method over the normal impulse."""
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        return [*(D @ [1, *(-mu * y[1:3] / np.hypot(*y[1:3]))]), y[0]]
+
+    def phase(start: np.ndarray, end: Callable[..., float]) -> np.ndarray | None:
+        ends: list[Any] = [lambda _, y: np.hypot(*y[1:3]) - 1e-6, end]
+        for one in ends:
+            one.terminal = True
+        run = solve_ivp(rates, (0, 50), start, method="Radau", rtol=1e-10, atol=1e-12, events=ends)
+        return None if len(run.t_events[0]) else run.y[:, -1]
+
+    turned_round = phase(np.array([*v, 0.0]), lambda _, y: y[0])
+    if turned_round is None:
+        return None
+    work = turned_round[3]
+    after = phase(np.array([1e-12, *turned_round[1:]]), lambda _, y: y[3] - work + e**2 * work)
+    return None if after is None else after[:3]
+
+
+def test_slip_that_turns_in_space_gives_back_the_part_of_the_energy() -> None:
+    stream = np.random.default_rng(4)
+    compared = 0
+    for _ in range(12):
+        A = stream.normal(size=(3, 5))
+        D, mu, e, v = A @ A.T / 5, stream.uniform(0, 0.6), stream.uniform(0, 1), np.array([-1.0, *stream.uniform(-3, 3, 2)])
+        one = stronge(D, v, e, Site((0, 1, 2), mu, mu))
+        assert one is not None and one.w == pytest.approx(v + D @ one.lam, abs=1e-11)
+        assert np.hypot(*one.lam[1:]) <= mu * one.lam[0] * (1 + 1e-9)
+        assert (v + one.w) @ one.lam < 1e-12
+        expected = followed(D, v, e, mu)
+        if expected is not None:
+            compared += 1
+            assert one.w == pytest.approx(expected, abs=1e-8)
+    assert compared > 6
+
+
+def test_slip_that_stops_in_space_slips_on_where_friction_does_not_hold_it() -> None:
+    """Along the one direction that its accelerations have themselves: from rest, a straight line to both ends of the impact."""
+    D = np.array([[2.0, 0.9, 0.5], [0.9, 1.0, 0.2], [0.5, 0.2, 1.5]])
+    mu, e = 0.2, 0.5
+    one = stronge(D, np.array([-1.0, 0, 0]), e, Site((0, 1, 2), mu, mu))
+    assert one is not None and one.modes[0].kind == SLIDING
+    d = one.w[1:] / np.hypot(*one.w[1:])
+    assert one.lam[1:] == pytest.approx(-mu * one.lam[0] * d, rel=1e-12)
+    assert one.w[0] == pytest.approx(e, rel=1e-12)
 
 
 def foot(name: str, at: list[float], friction: float = 1.2) -> sd.Contact:
@@ -100,7 +178,7 @@ def test_motion_with_an_impact_is_that_of_the_law() -> None:
     assert hit.impulse[0] == pytest.approx(expected.lam, rel=1e-9)
 
 
-def test_several_contacts_at_once_and_friction_in_space_are_rejected() -> None:
+def test_several_contacts_at_once_are_rejected() -> None:
     system = sd.System("rod", gravity=[0, -9.81])
     body = system.add_body("body", mass=1.0, inertia=1 / 3)
     system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
@@ -109,9 +187,20 @@ def test_several_contacts_at_once_and_friction_in_space_are_rejected() -> None:
     with pytest.warns(SimulationWarning, match="is one of 2 contacts at once, left, right; impact='stronge' takes"):
         run = system.compile().simulate((0, 1), q=[0, 0.1, 0])
     assert run.t[-1] == pytest.approx(math.sqrt(0.2 / 9.81), abs=1e-9)
+
+
+def test_a_motion_in_space_with_an_impact_is_that_of_the_law() -> None:
     space = sd.System("ball")
-    ball = space.add_body("body", mass=1.0, inertia=[1, 1, 1])
-    space.add_joint(sd.Free("free", space.ground, ball))
-    space.add_contact(foot("foot", [0, 0, 0]))
-    with pytest.raises(ModelError, match="impact='stronge' follows the slip in a plane"):
-        space.check()
+    ball = space.add_body("body", mass=1.0, inertia=[0.4, 0.3, 0.2])
+    space.add_joint(sd.Free("free", space.ground, ball, orientation=sd.EulerParameters()))
+    space.add_contact(foot("foot", [0.3, 0.2, -1], friction=0.2))
+    solution = space.compile().simulate((0, 0.5), q=[0, 0, 1.1, 1, 0, 0, 0], u=[1, 0.5, -1, 0, 0, 0], rtol=1e-12)
+    hit = solution.contacts["foot"].impacts
+    arm = np.array([0.3, 0.2, -1])
+    cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    D = np.eye(3) - cross @ np.diag(1 / np.array([0.4, 0.3, 0.2])) @ cross
+    places = [2, 0, 1]  # the normal, then the tangents along x and y
+    expected = stronge(D[np.ix_(places, places)], np.array([-1, 1, 0.5]), 0.6, Site((0, 1, 2), 0.2, 0.2))
+    assert expected is not None and len(hit.t) == 1
+    assert hit.after[0] == pytest.approx(expected.w, abs=1e-10)
+    assert hit.impulse[0] == pytest.approx(expected.lam, abs=1e-10)

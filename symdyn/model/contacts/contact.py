@@ -36,7 +36,7 @@ class Contact:
     law           "rigid": no penetration; open, sticking and sliding are modes that change at located events; "compliant": forces
                   by the depth of penetration and the slip, smooth in every formulation and method
     impact        law of rigid impacts: "newton" (velocities), "poisson" (impulses of compression and expansion) or "stronge"
-                  (their energies; one contact at a time, with friction in a plane)
+                  (their energies; one contact at a time)
     compliance    how a compliant contact yields, sd.contacts.Compliance(...)
     ignored       an expression; while it is positive a rigid contact that is open does not close, however deep it goes: the foot
                   of a straight leg that scuffs in mid-swing. None: it always counts
@@ -116,8 +116,6 @@ class Contact:
     def structure_faults(self, planar: bool) -> list[str]:
         """Shapes that do not fit each other or the plane."""
         a, b, found = self.on_a, self.on_b, list[str]()
-        if self.impact == "stronge" and not planar and not self.frictionless:
-            found.append(f"{self.where}: impact='stronge' follows the slip in a plane; in space pass 'poisson', or no friction")
         kind_a, kind_b = type(a).__name__, type(b).__name__
         if planar and isinstance(a, (Disc, Torus, Cylinder)):
             found.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
+    from scipy.interpolate import NdBSpline, PPoly, RectBivariateSpline
 
     from symdyn.given import Scalar, Vector
 
@@ -49,7 +49,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Disc:
-    """The edge of a thin disc on body a, in space; it touches a Plane at its lowest point.
+    """The edge of a thin disc on body a, in space.
 
     radius   m
     axis     of the disc, body axes; center: m, body axes
@@ -65,7 +65,7 @@ class Disc:
 
 @dataclass(frozen=True)
 class Torus:
-    """A torus on body a, in space, such as a tyre; it touches a Plane at its lowest point.
+    """A torus on body a, in space, such as a tyre.
 
     radius   of the circle in its middle, m; tube: radius of the tube around that, m
     axis     of the torus, body axes; center: m, body axes
@@ -152,7 +152,8 @@ class Curve:
              of the ends go on
     x        the symbol of the abscissa
 
-    The gap of a point is (y - f)/sqrt(1 + f'^2), which is the distance to first order and zero on the curve.
+    The gap of a point is (y - f)/sqrt(1 + f'^2), which is the distance to first order and zero on the curve; that of a Sphere is
+    the same at the point where it touches, which is found by Newton's method.
 
     >>> x = sp.Symbol("x")
     >>> sd.contacts.Curve(x**2 / 10, x).height
@@ -167,7 +168,8 @@ class Curve:
 class Surface:
     """A surface z = f(x, y) in the axes of body b, with body a above it; the gap is scaled as that of a Curve.
 
-    height   f, m, an expression of x, y and parameters
+    height   f, m, an expression of x, y and parameters, or a spline over a grid: SciPy's RectBivariateSpline or NdBSpline, beyond
+             whose ends the polynomials of the ends go on
     x, y     symbols of the horizontal coordinates
 
     >>> x, y = sp.symbols("x y")
@@ -175,7 +177,7 @@ class Surface:
     x*y
     """
 
-    height: Scalar
+    height: Scalar | RectBivariateSpline | NdBSpline
     x: sp.Symbol
     y: sp.Symbol
 

@@ -212,7 +212,7 @@ def touching_from(equations: Any, s: Any, size: Any, close: Any) -> Any:
         full = [a + d for a, d in zip(s, step)]
         if max(abs(d) for d in step) <= close * (size + max(abs(a) for a in s)):
             return (full, value) if positive else None
-        square, part = sum(a * a for a in k[:n]), 1
+        square, part = sum(a * a for a in k[:n]), 1.0
         while True:
             new = [a + d * part for a, d in zip(s, step)]
             *k, value = equations(new)

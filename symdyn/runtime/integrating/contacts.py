@@ -688,8 +688,8 @@ class _Phases:
         if law == STRONGE:
             if len(touching) > 1:
                 raise _Stop(f"the impact of {names} is one of {len(touching)} contacts at once, "
-                            f"{', '.join(self.records[k].name for k in touching)}; impact='stronge' takes one at a time, pass "
-                            "'poisson'")
+                            f"{', '.join(self.records[k].name for k in touching)}; impact='stronge' takes one at a time, as "
+                            "energies of several that press at once depend on an order that no law gives; pass 'poisson'")
             one_alone = stronge(D, v, float(at.restitution[touching[0]]), sites[0])
             found = [] if one_alone is None else [one_alone]
         else:
