@@ -52,14 +52,16 @@ def make(app: Sphinx, config: object = None) -> None:
 
 
 class Gallery(SphinxDirective):
-    """Pictures of mechanisms that lead to their pages: `trees`, `constrained` or `floating`."""
+    """Pictures of mechanisms that lead to their pages: `trees`, `constrained`, `floating` or `touching`."""
 
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         trees, constrained = sd.systems.names(False), sd.systems.names(True)
-        groups = {"trees": trees, "constrained": constrained,
-                  "floating": [n for n in sd.systems.names() if n not in (*trees, *constrained)]}
+        others = [name for name in sd.systems.names() if name not in (*trees, *constrained)]
+        touching = [name for name in others if sd.systems.get(name).contacts]
+        groups = {"trees": trees, "constrained": constrained, "touching": touching,
+                  "floating": [name for name in others if name not in touching]}
         cards = "".join(
             f'<a href="gallery/{name}.html"><img src="_static/{name}.svg" alt="{name}" width="260" height="200" loading="lazy">'
             f"<b>{name}</b><span>{escape(summary(name))}</span></a>" for name in groups[self.arguments[0]])

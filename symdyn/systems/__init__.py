@@ -56,7 +56,12 @@ _FLOATING = {
     "land_wind_turbine": "turbines:land_wind_turbine",
     "floating_crane": "cranes:floating_crane",
 }
-_CATALOGUE = {**_TREES, **_CONSTRAINED, **_FLOATING}
+_TOUCHING = {
+    "simplest_walker": "touching:simplest_walker",
+    "rocking_block": "touching:rocking_block",
+    "woodpecker_toy": "touching:woodpecker_toy",
+}
+_CATALOGUE = {**_TREES, **_CONSTRAINED, **_FLOATING, **_TOUCHING}
 
 __all__ = [*_CATALOGUE, "get", "names"]
 
@@ -65,7 +70,7 @@ def names(constrained: bool | None = None) -> list[str]:
     """The names of the catalogue.
 
     constrained   True: of mechanisms with loops or constraints only; False: of trees only; those that float, with the loads
-                  of water and wind, are in neither
+                  of water and wind, and those that touch are in neither
     """
     return list(_CATALOGUE if constrained is None else _CONSTRAINED if constrained else _TREES)
 

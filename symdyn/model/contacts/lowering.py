@@ -143,9 +143,11 @@ def with_contacts(system: System) -> System:
     if result.rigid_contacts:
         added = [SOFTNESS, *[s for c in result.rigid_contacts for s in (*c.switches, *c.sliding)]]
         result.defaults.update(dict.fromkeys(added, 0.0))
+        result.units = {**dict.fromkeys(added, "1"), **system.units}
         if any(len(c.sliding) == 2 for c in result.rigid_contacts):
             added.append(HOLDING)
             result.defaults[HOLDING] = SLOW
+            result.units[HOLDING] = "m/s"
         if system.declared is not None:
             result.declared = (*system.declared, *added)
     return result
