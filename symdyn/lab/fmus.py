@@ -101,7 +101,8 @@ def run(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--integrator", choices=("importer", "dop853"), default="importer",
                         help="FMPy's, or SciPy's for model exchange (default: importer)")
     parser.add_argument("--duration", type=float, default=1.0, help="of the motions, s (default: 1)")
-    parser.add_argument("names", nargs="*", default=sd.systems.names())
+    parser.add_argument("names", nargs="*", default=[name for name in sd.systems.names() if not sd.systems.get(name).contacts],
+                        help="default: all of the catalogue without rigid contacts, whose impacts are found in Python")
     chosen = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         for name in chosen.names:

@@ -141,7 +141,8 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Print a line for each mechanism of the catalogue."""
     parser = argparse.ArgumentParser(prog="python -m symdyn.lab.modelica")
     parser.add_argument("--test", action="store_true", help="simulate the written tests by Rumoca: up to minutes each")
-    parser.add_argument("names", nargs="*", default=sd.systems.names())
+    parser.add_argument("names", nargs="*", default=[name for name in sd.systems.names() if not sd.systems.get(name).contacts],
+                        help="default: all of the catalogue without rigid contacts, whose impacts are found in Python")
     chosen = parser.parse_args(arguments)
     for name in chosen.names:
         system = sd.systems.get(name)

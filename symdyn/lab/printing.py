@@ -25,7 +25,7 @@ FIRST_FORM = {("four_bar", "M_tilde"): 162, ("four_bar", "k_tilde"): 76, ("four_
 WITH_NAMES = {("puma560", "M_tilde"): 600, ("puma560", "k_tilde"): 1500, ("n_link_pendulum", "M_tilde"): 300}
 # Coordinates up to which the three quantities of the equations of motion take LIMIT seconds at most, or LONGER; and what these
 # take in named intermediates.
-COORDINATES, LIMIT, LONGER, NAMED_LIMIT = 6, 0.5, {"puma560": 2.0}, {"floating_wind_turbine": 5.0}
+COORDINATES, LIMIT, LONGER, NAMED_LIMIT = 6, 0.5, {"puma560": 2.0, "woodpecker_toy": 2.0}, {"floating_wind_turbine": 5.0}
 # Seconds after which another form is left out of the table.
 PATIENCE = 30.0
 HEADING = (f"{'mechanism':36}{'quantity':10}{'operations':>11}{'bound':>8}{'polynomial':>12}{'Fourier':>10}{'next best':>11} "

@@ -31,25 +31,8 @@ EDGES = {"beak": (ARM + REACH - BEAK - POLE_R, [0, 0, -BEAK_H], [1, ARM, REACH -
 
 @cache
 def woodpecker() -> Any:
-    """Points without mass on slides follow the edges; what does not touch is linear."""
-    q = sd.coordinates("y sleeve bird")
-    system = sd.System("woodpecker", gravity=[0, -G])
-    sleeve, bird = (system.add_body(f"{name}_along", mass=m) for name, m in (("sleeve", SLEEVE), ("bird", BIRD)))
-    system.add_joint(sd.Prismatic("sleeve_slide", system.ground, sleeve, axis=[0, 1], coordinate=q[0]))
-    for angle, inertia, other in ((q[1], SLEEVE_J, q[2]), (q[2], BIRD_J, q[1])):
-        turning = system.add_body(f"{angle.name}_turning", mass=0, inertia=inertia)
-        joint = system.add_joint(sd.Revolute(f"{angle.name}_hinge", system.ground, turning, coordinate=angle))
-        system.add_joint_force(joint, -SPRING * (angle - other))
-    system.add_joint(sd.Prismatic("bird_slide", system.ground, bird, axis=[0, 1], coordinate=q[0] + ARM * q[1] + REACH * q[2]))
-    for name, (gap, normal, along, restitution) in EDGES.items():
-        carrier, edge = system.add_body(f"{name}_carrier"), system.add_body(name)
-        system.add_joint(sd.Prismatic(f"{name}_gap", system.ground, carrier, axis=[1, 0],
-                                      coordinate=gap + sum(d * s for d, s in zip(normal, q, strict=True))))
-        system.add_joint(sd.Prismatic(f"{name}_way", carrier, edge, axis=[0, 1],
-                                      coordinate=sum(d * s for d, s in zip(along, q, strict=True))))
-        system.add_contact(sd.Contact(name, edge, system.ground, shape=(sd.contacts.Point(), sd.contacts.Plane([1, 0])),
-                                      friction=MU, restitution=restitution))
-    return system.compile()
+    """That of the catalogue, in which points without mass on slides follow the edges; what does not touch is linear."""
+    return sd.systems.woodpecker_toy().compile()
 
 
 @cache

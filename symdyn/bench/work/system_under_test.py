@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 LONG = 12_000
 BASIC = ("embedding", "recursive", "augmented", "absolute", "absolute:angles")
 GIVEN = "given"
+TOUCHES = ("its motion switches at rigid contacts, and references are of smooth equations; symdyn bench contacts compares methods "
+           "on motions that touch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,8 @@ class SystemUnderTest:
     def formulated(self, asked: Sequence[str] | None) -> tuple[list[Formulation], list[Skipped]]:
         """The formulations of these names, default: all; those that the mechanism does not have are skipped with the reason."""
         if self.given is not None:
-            return [Formulation(GIVEN, self.given)], []
+            touches = bool(self.given.contacts)
+            return [Formulation(GIVEN, self.given)] * (not touches), [Skipped(GIVEN, "", TOUCHES)] * touches
         found: list[Formulation] = []
         skipped: list[Skipped] = []
         for name in asked or self.names:
@@ -118,6 +121,8 @@ class SystemUnderTest:
         system = self.variants[next(iter(self.variants)) if angles or not variant else variant]
         derive: Callable[[], Any] = getattr(system, kind, system.augmented)
         model = system.check()
+        if model.contacts:
+            return Skipped(name, "", TOUCHES)
         tied = bool(model.loops or model.constraints)
         if kind == "augmented" and not tied:
             return Skipped(name, "", "a tree in the coordinates of its joints has no constraints: it would be the embedding")
