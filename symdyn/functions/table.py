@@ -81,6 +81,7 @@ FUNCTIONS = _entries(
      "both ends of every spring, damper and force between two points, n-frame, m", "loads between two points"),
     ("applied_loads", "applied_loads", None,
      "where every force and torque of a load acts on its body, m, and its vector, N or N m, n-frame", "loads on bodies"),
+    ("weights", "weights", ("n_b", "3"), "weight of every body, which acts at its centre of mass, n-frame, N", "gravity"),
     ("frames", "frames", ("n_b", "12"), "origin and rotation (row by row) of every body's frame, n-frame", _BODIES),
     ("positions", "positions", None, "centres of mass, n-frame, m", ""),
     ("watches", "watches", None,

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.animation import FuncAnimation
 
 from symdyn.errors import ArgumentError
-from symdyn.pictures.bodies import ABOVE, make_artists, make_axes, move, show
+from symdyn.kinds import flag
+from symdyn.pictures.bodies import ABOVE, explain, make_artists, make_axes, move, show
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
 from symdyn.pictures.film import Film
@@ -24,9 +25,10 @@ MAX_FRAMES = 3000
 
 
 def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 1.0,
-            view: Any = None) -> FuncAnimation:
+            view: Any = None, forces: bool = False) -> FuncAnimation:
     """The moving bodies, with the way of the last centre of mass.
 
+    forces  with arrows of forces in joints, loads and weights, and torques of loads
     fps     pictures a second; speed: seconds of motion in one second of film
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
     path    where to save the film: a .gif, which needs Pillow and nothing else, or an .mp4 by the program ffmpeg
@@ -42,7 +44,8 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     if not (LEAST_FPS <= rate <= 1 / LEAST_FPS and 0 < speed < np.inf):
         raise ArgumentError(f"fps and speed must be positive, fps from {LEAST_FPS} to {1 / LEAST_FPS:.0f}, found fps = {rate:g}, "
                             f"speed = {speed:g}")
-    whole = Drawing.of(solution) if len(solution.t) > 1 else None
+    flag(forces, f"{solution.module.name}: forces")
+    whole = Drawing.of(solution, forces) if len(solution.t) > 1 else None
     if whole is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to animate: at least two times and the function "
                             "'positions' are needed, and bodies that extend or move")
@@ -63,6 +66,7 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8, zorder=ABOVE)[0]
     artists = make_artists(axes, drawing)
     axes.set_title(solution.module.name, fontsize=11)
+    explain(figure, whole)
     clock = figure.text(0.02, 1 - 0.2 / height, "", family="monospace")
 
     def draw(k: int) -> list[Any]:

@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from symdyn.errors import ArgumentError
-from symdyn.pictures.arrows import arrows
+from symdyn.pictures.arrows import TITLES
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.looks import color_of_body
 from symdyn.pictures.scene import Scene
+from symdyn.pictures.skeleton import Skeleton
 from symdyn.pictures.style import MANY
 from symdyn.real_numbers import NotReal, real
 from symdyn.shown import shown
@@ -23,10 +25,10 @@ VIEW = (22.0, -55.0)
 VIEW_OF_SOLIDS = (14.0, -58.0)
 # Of the axes' box before it is fitted.
 ZOOM = 0.79
-# Forces of contacts.
-FORCE = "#B45309"
 # Of flat ground, of the extent of the picture.
 _THICK = 0.015
+# Of the legend of arrows: width of an entry and height of a line, inches.
+_ENTRY, _LINE = 2.0, 0.16
 # What is drawn over all shapes.
 ABOVE = 1e6
 
@@ -130,7 +132,7 @@ def _view(view: Any, drawing: Drawing) -> tuple[float, float]:
 def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) -> None:
     """Start and end of the motion, and the way of the centres of mass."""
     axes = make_axes(figure, place, drawing, view)
-    n_b = len(drawing.lines)
+    n_b = drawing.centres.shape[1]
     for k in range(n_b) if n_b <= 3 else [n_b - 1]:
         axes.plot(*drawing.centres[:, k].T, color=color_of_body(k), linewidth=0.8, alpha=0.7, zorder=ABOVE)
     for index, alpha in ((0, 0.3), (-1, 1.0)):
@@ -144,33 +146,53 @@ def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
     scenes = [Scene(drawing.solids, drawing.axes, drawing.up, alpha)] if drawing.solids is not None else []
     for scene in scenes:
         axes.add_collection(scene, autolim=False)
-    return [*scenes, *(_sticks(axes, drawing, alpha) if drawing.sticks else ()), *_contacts(axes, drawing, alpha)]
+    return [*scenes, *(_sticks(axes, drawing, drawing.sticks, alpha) if drawing.sticks is not None else ()),
+            *_arrows(axes, drawing, alpha)]
 
 
-def _sticks(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
-    """Curves for rails, arms, rods, bodies, sliders and centres of mass."""
+def _sticks(axes: Any, drawing: Drawing, sticks: Skeleton, alpha: float) -> list[Any]:
+    """Curves for rails, arms, bodies, sliders and centres of mass."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
-    colors = [color_of_body(k) for k in range(len(drawing.lines))]
-    if len(drawing.pivots):
-        axes.plot(*drawing.pivots.T, linestyle="", marker="^", color="0.3", markersize=9, zorder=4)
+    colors = [color_of_body(k) for k in range(len(sticks.lines))]
+    if len(sticks.pivots):
+        axes.plot(*sticks.pivots.T, linestyle="", marker="^", color="0.3", markersize=9, zorder=4)
     style = {"alpha": alpha, "solid_capstyle": "round", "solid_joinstyle": "round"}
-    width = 4.0 if len(drawing.lines) <= MANY else 2.0
+    width = 4.0 if len(sticks.lines) <= MANY else 2.0
     return [axes.plot(*empty, color="0.6", linestyle=":", linewidth=1.2, alpha=alpha)[0],
             axes.plot(*empty, color="0.4", linewidth=1.0, alpha=alpha)[0],
-            axes.plot(*empty, color="0.4", linewidth=0.6 * width, marker="o", markersize=0.8 * width, **style)[0],
             *[axes.plot(*empty, color=c, linewidth=width, marker="o", markersize=width, **style)[0] for c in colors],
             *[axes.plot(*empty, color=colors[k], linestyle="", marker="s", markersize=3.5 * width, alpha=alpha)[0]
-              for k in drawing.sliders],
+              for k in sticks.sliders],
             axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0]]
 
 
-def _contacts(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
-    """Curves for arrows of forces, and points where they act."""
-    if not drawing.touches.shape[1]:
-        return []
+def _arrows(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
+    """Curves for arrows, and points where contacts act."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
-    return [axes.plot(*empty, color=FORCE, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0],
-            axes.plot(*empty, color=FORCE, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0]]
+    found = []
+    for one in drawing.arrows:
+        color = one.arrows.color
+        found.append(axes.plot(*empty, color=color, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0])
+        if one.arrows.layer == "contacts":
+            found.append(axes.plot(*empty, color=color, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0])
+    return found
+
+
+def explain(figure: Any, drawing: Drawing) -> None:
+    """What the colours of arrows mean, and how large the largest are, below all axes; nothing without forces besides contacts."""
+    if not any(one.arrows.layer != "contacts" for one in drawing.arrows):
+        return
+    lines = [Line2D([], [], color=one.arrows.color, linewidth=1.6) for one in drawing.arrows]
+    texts = [f"{TITLES[one.arrows.layer]}, up to {one.arrows.largest:.3g} {one.arrows.unit}" for one in drawing.arrows]
+    columns = max(1, min(len(texts), int(figure.get_figwidth() / _ENTRY)))
+    wide, high = figure.get_size_inches()
+    more = _LINE * -(-len(texts) // columns) + _LINE / 2
+    places = {axes: axes.get_position() for axes in figure.axes}
+    figure.set_size_inches(wide, high + more)
+    for axes, place in places.items() if drawing.spatial else ():
+        axes.set_position((place.x0, (place.y0 * high + more) / (high + more), place.width, place.height * high / (high + more)))
+    figure.legend(lines, texts, loc="lower center" if drawing.spatial else "outside lower center", fontsize=7, frameon=False,
+                  handlelength=1.2, columnspacing=1.2, labelspacing=0.3, ncols=columns)
 
 
 def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
@@ -183,11 +205,14 @@ def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
 
 
 def _points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
-    slides = [drawing.lines[k][:, places] for k, places in drawing.sliders.items()]
-    sticks = [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides,
-                                           drawing.centres[:, drawing.bare])] if drawing.sticks else []
-    return sticks + (
-        [arrows(drawing.touches[index], drawing.pushes[index]), drawing.touches[index]] if drawing.touches.shape[1] else [])
+    found, sticks = [], drawing.sticks
+    if sticks is not None:
+        slides = [sticks.lines[k][:, places] for k, places in sticks.sliders.items()]
+        found += [points[index] for points in (sticks.rails, sticks.arms, *sticks.lines, *slides,
+                                               drawing.centres[:, drawing.bare])]
+    for one in drawing.arrows:
+        found += [one.curve(index), *([one.tails[index]] if one.arrows.layer == "contacts" else [])]
+    return found
 
 
 def move(artist: Any, points: np.ndarray) -> None:

@@ -80,24 +80,35 @@ class Form:
 
 @dataclass(frozen=True)
 class Forms:
-    """All solids of a mechanism and what they hang on; up: the direction in which stands rise; length of the mechanism, m."""
+    """All solids of a mechanism and what they hang on.
+
+    up   the direction in which stands rise; length of the mechanism, m; far: indices of points that pictures need not show
+    """
 
     forms: Sequence[Form]
     hung: Hung
     up: np.ndarray
     length: float
+    far: Sequence[int] = ()
 
     @classmethod
     def of(cls, m: Mechanism) -> Forms:
         """What is always shown of a mechanism."""
         with np.errstate(all="ignore"):
             items, length = looks_of(m)
-        return cls([form for item in items if not item.layer for form in _forms(item)], Hung.of(m), np.array(m.up), length)
+        return cls([form for item in items if not item.layer for form in _forms(item)], Hung.of(m), np.array(m.up), length,
+                   m.anchors)
 
     def vertices(self, origins: np.ndarray, rotations: np.ndarray) -> list[np.ndarray]:
         """Of every part at one time; origins (n_b + 1, 3) and rotations (n_b + 1, 3, 3), the last the ground's."""
         posed = self.hung.at(origins, rotations)
         return [form.place(posed, self.up) for form in self.forms]
+
+
+    def near(self, origins: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Points at all times that pictures show, (n_t, n, 3); origins (n_t, n_b + 1, 3), rotations (n_t, n_b + 1, 3, 3)."""
+        owners, places = (np.delete(rows, self.far, axis=0) for rows in (self.hung.owners, self.hung.places))
+        return np.asarray(origins[:, owners] + np.einsum("tnij,nj->tni", rotations[:, owners], places))
 
 
 def across(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -90,11 +90,15 @@ class Mechanism:
                                                                 self.spring_points)])
 
     @property
-    def near_points(self) -> np.ndarray:
-        """The points without the anchors of mooring lines, which are far away."""
+    def anchors(self) -> list[int]:
+        """Indices of the anchors of mooring lines, which are far away."""
         first = len(self.points) - 2 * len(self.connections)
-        far = [first + 2 * k + 1 for k, (*_, kind) in enumerate(self.connections) if kind == "line"]
-        return np.delete(self.points, far, axis=0)
+        return [first + 2 * k + 1 for k, (*_, kind) in enumerate(self.connections) if kind == "line"]
+
+    @property
+    def near_points(self) -> np.ndarray:
+        """The points without anchors."""
+        return np.delete(self.points, self.anchors, axis=0)
 
     @property
     def carriers(self) -> frozenset[int]:
@@ -145,6 +149,12 @@ class Mechanism:
         xx, xy, xz, yy, yz, zz = self.inertia[body, 4:]
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / m - (c @ c * np.eye(3) - np.outer(c, c))
         return m, np.where(np.abs(about) > 1e-12 * max(c @ c, 1e-300), about, 0.0)
+
+
+def carriers(bodies: Sequence[str], joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> set[int]:
+    """Indices of the massless bodies that joints in loops have been given; joined: the two bodies of each joint."""
+    made = {f"{name}_carrier" for name in joints} - {name for pair in joined for name in pair}
+    return {k for k, name in enumerate(bodies) if name in made}
 
 
 def up_of(down: Sequence[float], planar: bool) -> tuple[float, float, float]:
@@ -231,10 +241,14 @@ def _joints(m: Mechanism, r: float, length: float, carriers: frozenset[int]) -> 
             yield Item("rod", (2 * j, 2 * j + 1), (0.6 * r, 0.6 * r), METAL, title)
             continue
         if kind in _SLIDING:
-            yield replace(own, kind="block", size=(2.2 * r, 2.2 * r, 3.2 * r), color=color_of_body(ends[1]))
+            # The block is on what moves along the rail: on the child, or on the parent where the child is the ground.
+            flipped = ends[1] == GROUND
+            moving, held = (2 * j, 2 * j + 1) if flipped else (2 * j + 1, 2 * j)
+            yield replace(own, kind="block", ends=(moving,), size=(2.2 * r, 2.2 * r, 3.2 * r), body=ends[not flipped],
+                          color=color_of_body(ends[not flipped]))
             least, most = m.travels[j] if m.travels else (-_RAIL * length, _RAIL * length)
-            rail = ((("off", 2 * j, j, least - 6 * r), ("off", 2 * j, j, most + 6 * r)) if GROUND in ends
-                    else (2 * j, 2 * j + 1))
+            least, most = (-most, -least) if flipped else (least, most)
+            rail = (("off", held, j, least - 6 * r), ("off", held, j, most + 6 * r)) if GROUND in ends else (held, moving)
             yield Item("rod", rail, (0.5 * r, 0.5 * r), STEEL, title)
             continue
         yield replace(own, kind="pin", size=(1.5 * r, 1.9 * r)) if np.any(m.joint_axes[j]) else replace(

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.pictures.arrows import POINTS
-from symdyn.pictures.jointed import carriers
-from symdyn.pictures.looks import GROUND, Mechanism, Ref, point_of, ropes_of
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, carriers, point_of, ropes_of
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:

@@ -95,11 +95,10 @@ def _hides(own: tuple, others: np.ndarray, other: tuple, owns: np.ndarray, camer
     return answer
 
 
-def cut(polygon: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
-    """The parts below and above z = level of a convex polygon (n, 3) that has both."""
-    z = polygon[:, 2] - level
+def cut(polygon: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts below and above the water of a convex polygon (n, 3) that has both; heights (n,): of its corners above it."""
     below, above = [], []
-    for a, b, za, zb in zip(polygon, np.roll(polygon, -1, axis=0), z, np.roll(z, -1), strict=True):
+    for a, b, za, zb in zip(polygon, np.roll(polygon, -1, axis=0), heights, np.roll(heights, -1), strict=True):
         if za <= 0:
             below.append(a)
         if za >= 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from symdyn.pictures.painter import Camera, cut, order, planes
 from symdyn.pictures.solids import Solids, Water
 
 _WATER_ALPHA = 0.38
+# Strips of water with waves: a wave length's, at most; the width of their edges; how much lighter crests are, and darker troughs.
+_PER_WAVE, _MOST_STRIPS, _SEAM, _CREST = 24, 240, 0.0, 0.3
 # Of a colour: what is left in the shade, and along edges.
 _SHADE, _EDGE = 0.5, 0.6
 
@@ -30,14 +32,14 @@ class Scene(PolyCollection):
         self._solids, self._opacity, self._spatial = solids, alpha, len(shown) == 3
         self._up = np.array(up)
         self._flat = _facing(shown[0], shown[1], self._up) if len(shown) == 2 else None
-        self._places = solids.vertices(0)
+        self._places, self._time = solids.vertices(0), float(solids.times[0])
         self.set_in_layout(False)
         self.set_capstyle("round")
         self.set_joinstyle("round")
 
     def place(self, index: int) -> None:
         """Show the shapes at one of the times."""
-        self._places = self._solids.vertices(index)
+        self._places, self._time = self._solids.vertices(index), float(self._solids.times[index])
         self.stale = True
 
     def do_3d_projection(self) -> float:
@@ -53,7 +55,6 @@ class Scene(PolyCollection):
     def _paint(self, camera: Camera) -> None:
         """Polygons below the water, the water, and those above it; the other way round for an eye under water."""
         water = self._solids.water if self._spatial else None
-        level = water.level if water is not None else -np.inf
         low, high = _Pieces(self._opacity), _Pieces(self._opacity)
         light = _light(camera.toward(np.concatenate(self._places).mean(axis=0)), self._up) if self._places else np.zeros(3)
         for k in order(self._solids.parts, self._places, camera):
@@ -68,23 +69,24 @@ class Scene(PolyCollection):
             edges = np.where(part.creases, seen[own].any(axis=1) | (own < 0).all(axis=1), seen[own].sum(axis=1) == 1)
             shaded = np.clip(np.array(part.color) * (_SHADE + (1 - _SHADE) * (1 + normals[faces] @ light) / 2)[:, None], 0, 1)
             dark = np.array(part.color) * (_EDGE if len(part.faces) else 1.0)
-            flat, z = camera.project(places), places[:, 2]
-            whole = high if z.min() >= level else low if z.max() <= level else None
+            flat = camera.project(places)
+            z = water.heights(places, self._time) if water is not None else np.zeros(len(places))
+            whole = high if z.min() >= 0 else low if z.max() <= 0 else None
             for vertices, color, width in (*((part.faces[k], color, 0.3) for k, color in zip(faces, shaded, strict=True)),
                                            *((ends, dark, part.width) for ends in part.edges[edges, :2])):
                 if whole is not None:
                     whole.add(flat[vertices], color, width)
                     continue
                 heights = z[vertices]
-                if heights.min() >= level or heights.max() <= level:
-                    (high if heights.min() >= level else low).add(flat[vertices], color, width)
+                if heights.min() >= 0 or heights.max() <= 0:
+                    (high if heights.min() >= 0 else low).add(flat[vertices], color, width)
                 else:
-                    for pieces, points in zip((low, high), cut(places[vertices], level), strict=True):
+                    for pieces, points in zip((low, high), cut(places[vertices], heights), strict=True):
                         pieces.add(camera.project(points), color, width)
         surface = _Pieces(1.0, self._opacity * _WATER_ALPHA)
-        if water is not None:
-            surface.add(camera.project(self._surface(water)), np.array(water.color), 0.8)
-        above = camera.eye[2] > level * camera.eye[3] if water is not None else True
+        for strip, color in self._surface(water, camera) if water is not None else ():
+            surface.add(camera.project(strip), color, _SEAM if water is not None and water.waves else 0.8)
+        above = camera.eye[2] > water.level * camera.eye[3] if water is not None else True
         together = (low, surface, high) if above else (high, surface, low)
         self.set_verts([polygon for pieces in together for polygon in pieces.polygons], closed=True)
         colors: Any = np.array([color for pieces in together for color in pieces.colors]).reshape(-1, 4)
@@ -92,11 +94,33 @@ class Scene(PolyCollection):
         self.set_edgecolor(colors)
         self.set_linewidth([width for pieces in together for width in pieces.widths])
 
-    def _surface(self, water: Water) -> np.ndarray:
-        """Corners of the water's rectangle, (4, 3)."""
+    def _surface(self, water: Water, camera: Camera) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """The water's rectangle, or its strips along the crests of waves from back to front: corners (n, 3) and colour."""
         axes: Any = self.axes
-        (x0, y0), (x1, y1) = water.reach if water.reach is not None else np.column_stack([axes.get_xlim(), axes.get_ylim()])
-        return np.array([[x0, y0, water.level], [x1, y0, water.level], [x1, y1, water.level], [x0, y1, water.level]])
+        (x0, y0), (x1, y1) = water.reach if water.reach is not None else np.sort(
+            np.array([axes.get_xlim(), axes.get_ylim()]), axis=1).T
+        flat, color = np.array([[x0, y0, water.level], [x1, y0, water.level], [x1, y1, water.level], [x0, y1, water.level]]), \
+            np.array(water.color)
+        if water.waves is None:
+            yield flat, color
+            return
+        along = flat[:, :2] @ water.heading
+        count = int(np.clip(np.ptp(along) / water.waves[2] * _PER_WAVE, _PER_WAVE, _MOST_STRIPS))
+        ends = np.linspace(along.min(), along.max(), count + 1)
+        toward = camera.toward(flat.mean(axis=0))[:2] @ water.heading
+        for k in range(count) if toward > 0 else range(count - 1, -1, -1):
+            strip = _between(flat, along, ends[k], ends[k + 1])
+            strip[:, 2] += water.elevation(self._time, strip[:, :2] @ water.heading)
+            (height,) = water.elevation(self._time, ends[k:k + 2].mean(keepdims=True))
+            yield strip, np.clip(color * (1 + _CREST * height / water.waves[0]), 0, 1)
+
+
+def _between(corners: np.ndarray, along: np.ndarray, low: float, high: float) -> np.ndarray:
+    """What of a rectangle (4, 3) is between two lines across a direction; along: of its corners along it."""
+    ahead = cut(corners, along - low)[1] if (along < low).any() else corners
+    way = np.linalg.lstsq(corners - corners[0], along - along[0], rcond=None)[0]
+    places = (ahead - corners[0]) @ way + along[0]
+    return np.array(cut(ahead, places - high)[0] if (places > high).any() else ahead)
 
 
 def _facing(right: int, upward: int, up: np.ndarray) -> Camera:

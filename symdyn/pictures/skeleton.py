@@ -1,4 +1,4 @@
-"""The lines of a mechanism; from its motion alone where its joints are not known."""
+"""The lines of a mechanism whose joints are not known, from its motion alone."""
 
 from __future__ import annotations
 
@@ -12,20 +12,36 @@ from symdyn.pictures.joints import GROUND, find_joints
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Points over time: of each body's line (n_t, n_points, 3), of arms, rails, rods, pivots and sliders as in Drawing."""
+    """Points over time, in space or in a plane.
+
+    lines      of each body, (n_t, n_points, 3); NaN where the pen is lifted
+    arms       from each body's first point to its centre of mass, joined in one line; rails: from slider to slider
+    pivots     points that hold the mechanism to the ground, (n, 3)
+    sliders    the bodies that slide, and which points of their lines do
+    """
 
     lines: list[np.ndarray]
     arms: np.ndarray
     rails: np.ndarray
-    rods: np.ndarray
     pivots: np.ndarray
     sliders: dict[int, list[int]]
+
+    def in_axes(self, shown: Sequence[int]) -> Skeleton:
+        """In some axes of the n-frame."""
+        axes = list(shown)
+        return Skeleton([line[..., axes] for line in self.lines], self.arms[..., axes], self.rails[..., axes],
+                        self.pivots[..., axes], self.sliders)
+
+    def at(self, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> Skeleton:
+        """At other times: a share w (n, 1, 1) of the way from the times a to the times b."""
+        arms, rails, *lines = (points[a] * (1 - w) + points[b] * w for points in (self.arms, self.rails, *self.lines))
+        return Skeleton(lines, arms, rails, self.pivots, self.sliders)
 
 
 def bare_skeleton(centres: np.ndarray) -> Skeleton:
     """Centres of mass alone, (n_t, n_b, 3)."""
     nothing = np.zeros((len(centres), 0, 3))
-    return Skeleton([c[:, None] for c in np.moveaxis(centres, 1, 0)], nothing, nothing, nothing, np.zeros((0, 3)), {})
+    return Skeleton([c[:, None] for c in np.moveaxis(centres, 1, 0)], nothing, nothing, np.zeros((0, 3)), {})
 
 
 def guess_skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray,
@@ -63,7 +79,7 @@ def guess_skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarr
     for k in range(n_b):
         if not carried[k] and _length(lines[k]) < 1e-6 * size:
             lines[k] = np.stack([origins[:, k], centres[:, k]], axis=1)
-    return Skeleton(lines, connect(arms, n_t), connect(rails, n_t), connect([], n_t), np.array(pivots).reshape(-1, 3), sliders)
+    return Skeleton(lines, connect(arms, n_t), connect(rails, n_t), np.array(pivots).reshape(-1, 3), sliders)
 
 
 def extent(*points: np.ndarray) -> float:

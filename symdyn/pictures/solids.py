@@ -38,12 +38,31 @@ class Water:
     color: tuple[float, float, float]
     waves: tuple[float, ...] | None = None
 
+    @property
+    def heading(self) -> np.ndarray:
+        """Unit vector (2,) along which waves go; x without waves."""
+        angle = self.waves[3] if self.waves is not None else 0.0
+        return np.array([np.cos(angle), np.sin(angle)])
+
+    def elevation(self, time: float, along: np.ndarray) -> np.ndarray:
+        """How high the surface is above its level at places `along` the heading, m."""
+        if self.waves is None:
+            return np.zeros_like(along)
+        amplitude, frequency, length, _, ramp = self.waves
+        grown = amplitude * ((1 - np.cos(np.pi * np.clip(time / ramp, 0.0, 1.0))) / 2 if ramp > 0 else 1.0)
+        return np.asarray(grown * np.cos(frequency * time - 2 * np.pi / length * along))
+
+    def heights(self, points: np.ndarray, time: float) -> np.ndarray:
+        """How high points (n, 3) are above the surface, m."""
+        return np.asarray(points[:, 2] - self.level - self.elevation(time, points[:, :2] @ self.heading))
+
 
 @dataclass(frozen=True)
 class Solids:
     """Shapes of bodies over time.
 
     own         of shapes of the user's and of what bends, in body axes; bending: of each of these, if it bends
+    times       (n_t,), s
     forms       what bodies, joints and springs look like by themselves; None where joints are not listed
     origins     (n_t, n_b + 1, 3) and rotations (n_t, n_b + 1, 3, 3), the last the ground's; bodies: those that have shapes
     """
@@ -55,6 +74,7 @@ class Solids:
     origins: np.ndarray
     rotations: np.ndarray
     bodies: frozenset[int]
+    times: np.ndarray
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -95,7 +115,7 @@ class Solids:
                 bending.append(bent[body].of(parts[-1]))
         bodies = {part.body for part in parts}
         rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)
-        return cls(parts, bending, forms, water, frames[..., :3], rotations, frozenset(bodies))
+        return cls(parts, bending, forms, water, frames[..., :3], rotations, frozenset(bodies), solution.t)
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Solids:
         """The shapes at other times: origins between those of the two nearest times, rotations on the shortest way."""
@@ -104,7 +124,7 @@ class Solids:
         a, b = order[right - 1], order[right]
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
         turned = part_way(self.rotations[a], self.rotations[b], w)
-        return replace(self, origins=self.origins[a] * (1 - w) + self.origins[b] * w, rotations=turned,
+        return replace(self, origins=self.origins[a] * (1 - w) + self.origins[b] * w, rotations=turned, times=times,
                        bending=[None if one is None else one.between(a, b, w[:, :, 0]) for one in self.bending])
 
     def vertices(self, index: int) -> list[np.ndarray]:
@@ -118,12 +138,17 @@ class Solids:
             found.append(placed)
         return found if self.forms is None else found + self.forms.vertices(self.origins[index], self.rotations[index])
 
+    def points(self) -> np.ndarray:
+        """Points of joints, bodies and springs at every time, (n_t, n, 3); none without forms."""
+        return np.zeros((len(self.times), 0, 3)) if self.forms is None else self.forms.near(self.origins, self.rotations)
+
     def reach(self) -> np.ndarray:
         """Points that the picture must show, (n, 3)."""
         some = np.unique(np.linspace(0, len(self.origins) - 1, _SAMPLES).astype(int))
         points = [np.concatenate(self.vertices(int(k))) for k in some] if self.parts else []
         if self.water is not None and self.water.reach is not None:
-            points.append(np.column_stack([self.water.reach, np.full(2, self.water.level)]))
+            high = self.water.waves[0] if self.water.waves is not None else 0.0
+            points += [np.column_stack([self.water.reach, np.full(2, self.water.level + sign * high)]) for sign in (-1, 1)]
         return np.concatenate(points) if points else np.zeros((0, 3))
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from symdyn.errors import ArgumentError
-from symdyn.pictures.bodies import height_of, make_artists, make_axes, show, title
+from symdyn.kinds import flag
+from symdyn.pictures.bodies import explain, height_of, make_artists, make_axes, show, title
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
 from symdyn.real_numbers import real_of
@@ -23,15 +24,17 @@ _SIDE = 4.2
 _BELOW, _ABOVE = 0.14, 0.13
 
 
-def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None) -> Figure:
+def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None, forces: bool = False) -> Figure:
     """The mechanism at one time or several (default: start and end), side by side in axes of the same limits.
 
-    view   elevation and azimuth of the eye, degrees, or one pair for each picture
+    view     elevation and azimuth of the eye, degrees, or one pair for each picture
+    forces   with arrows of forces in joints, loads and weights, and torques of loads
 
     Returns the figure; saves it if a path is given. Raises ArgumentError for times outside of the motion, and if nothing can be
     drawn.
     """
-    drawing = Drawing.of(solution) if len(solution.t) else None
+    flag(forces, f"{solution.module.name}: forces")
+    drawing = Drawing.of(solution, forces) if len(solution.t) else None
     if drawing is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to draw: the function 'positions' is needed, and bodies "
                             "that extend or move")
@@ -49,6 +52,7 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
         title(axes, f"t = {time:.5g} s", 10)
     if drawing.spatial:
         _close_up(figure, rows, columns)
+    explain(figure, drawing)
     if path is not None:
         figure.save(path)
     return figure

@@ -16,8 +16,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
-from symdyn.pictures.jointed import carriers
-from symdyn.pictures.looks import Mechanism, ropes_of
+from symdyn.pictures.looks import Mechanism, carriers, ropes_of
 from symdyn.pictures.mechanism import touched
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
-from symdyn.pictures.arrows import LENGTH, LONGEST, floor_of, names_of, touching, usual
+from symdyn.pictures.arrows import TITLES, Arrows, arrows_of, floor_of, touching
 from symdyn.pictures.bending import bendings
 from symdyn.pictures.mechanism import Hung, mechanism_of
 from symdyn.pictures.panels import panels_of
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 # What the eye does not see: of the mechanism's length, and of a turn in radians.
 _SEEN, _TURN = 1.5e-3, 3e-3
+# What the eye does not see of an arrow, of the largest.
+_LONGER = 0.02
 # Rows of a motion, and of its curves, at most.
 _MOST, _CURVES = 40_000, 2_000
-# The function of a module that gives where loads act and how.
-LOADS = "applied_loads"
 # Contacts at heights that differ by less touch a flat ground; of the mechanism's length.
 _FLAT = 1e-3
 
@@ -62,7 +62,9 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     frames, t = frames[order], solution.t[order]
     hung = Hung.of(mechanism)
     scene = scene_of(mechanism, about.drawn, lengths_of(solution), bendings(solution), name)
-    rows = _rows(t, frames, scene["length"])
+    arrows = arrows_of(solution, scene["length"], forces)
+    acting = [one.vectors[order] / one.largest for one in arrows if one.layer != "contacts"]
+    rows = _rows(t, frames, scene["length"], np.nan_to_num(np.concatenate(acting, axis=1)) if acting else None)
     chosen = frames[rows]
     scene |= {"kind": "recorded", "name": name, "t": packed(t[rows]), "origins": packed(chosen[..., :3].reshape(len(rows), -1)),
               "turns": packed(_quaternions(chosen[..., 3:].reshape(len(rows), n_b, 3, 3)).reshape(len(rows), -1)),
@@ -71,41 +73,19 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     eta = list(dict.fromkeys(c for record in about.flexible for c in record["coordinates"]))
     if eta:
         scene["eta"] = {"names": eta, "values": packed(np.column_stack([solution[c] for c in eta])[order][rows])}
-    scene |= _forces(solution, order[rows]) if forces else {}
-    at, pushes = touching(solution)
-    if at.shape[1] and usual(pushes):
-        both = np.nan_to_num(np.concatenate([at, pushes], axis=2)[order][rows])
-        scene["contacts"] = {"names": names_of(solution), "values": packed(both.reshape(len(rows), -1)), "usual": usual(pushes),
-                             "length": LENGTH, "longest": LONGEST}
-        scene["ground"] = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
+    scene["arrows"] = [_arrows(one, order[rows]) for one in arrows]
+    at, _ = touching(solution)
+    scene["ground"] = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
     return scene
 
 
-def _forces(solution: Solution, rows: np.ndarray) -> dict[str, Any]:
-    """Forces in joints and those of loads, to one scale, and torques of loads; what is zero all the time is left out."""
-    module, about, n_t = solution.module, solution.module.metadata, len(solution.t)
-    found: dict[str, Any] = {}
-    if about.reactions and "reactions" in module.functions:
-        values = np.nan_to_num(solution.rows("reactions").reshape(n_t, -1, 6)[rows][..., :3])
-        found["forces"] = {"joints": list(about.reactions), "values": packed(values.reshape(len(rows), -1)),
-                           "largest": _largest(values)}
-    if LOADS in module.functions:
-        values = np.nan_to_num(solution.rows(LOADS).reshape(n_t, -1, 6)[rows])
-        there = [k for k in range(len(about.acting)) if values[:, k, 3:].any()]
-        if there:
-            kinds = [about.acting[k][2] for k in there]
-            values = values[:, there]
-            largest = {kind: _largest(values[:, [k == kind for k in kinds], 3:]) for kind in ("force", "torque")}
-            common = max(largest["force"], found.get("forces", {}).get("largest", 0.0))
-            found["loads"] = {"names": [f"{about.acting[k][0]} on {about.acting[k][1]}" for k in there], "kinds": kinds,
-                              "values": packed(values.reshape(len(rows), -1)), "largest": {**largest, "force": common}}
-            if "forces" in found:
-                found["forces"]["largest"] = common
-    return found
-
-
-def _largest(vectors: np.ndarray) -> float:
-    return float(np.linalg.norm(vectors, axis=-1).max(initial=0.0))
+def _arrows(arrows: Arrows, rows: np.ndarray) -> dict[str, Any]:
+    """Vectors at some rows, with places where these are no points of the mechanism: zero while nothing acts."""
+    vectors = np.nan_to_num(arrows.vectors[rows])
+    every = vectors if len(arrows.points) else np.concatenate([np.nan_to_num(arrows.tails[rows]), vectors], axis=2)
+    return {"layer": arrows.layer, "title": TITLES[arrows.layer], "color": arrows.color, "names": list(arrows.names),
+            "points": list(arrows.points), "unit": arrows.unit, "scale": arrows.scale,
+            "longest": arrows.longest if np.isfinite(arrows.longest) else None, "values": packed(every.reshape(len(rows), -1))}
 
 
 def _locals(hung: Hung) -> list[list[float]]:
@@ -122,18 +102,19 @@ def _short(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _rows(t: np.ndarray, frames: np.ndarray, length: float) -> np.ndarray:
-    """Indices of the fewest evenly spaced rows between which interpolation shows the same motion."""
+def _rows(t: np.ndarray, frames: np.ndarray, length: float, acting: np.ndarray | None = None) -> np.ndarray:
+    """Indices of the fewest evenly spaced rows between which interpolation shows the same motion; acting: forces and torques
+    (n_t, n, 3), of their largest."""
     n = len(t)
     stride = 1
-    while stride * 2 < n and _error(t, frames, np.unique([*range(0, n, stride * 2), n - 1]), length) <= 1.0:
+    while stride * 2 < n and _error(t, frames, np.unique([*range(0, n, stride * 2), n - 1]), length, acting) <= 1.0:
         stride *= 2
     stride = max(stride, -(-n // _MOST))
     return np.unique([*range(0, n, stride), n - 1])
 
 
-def _error(t: np.ndarray, frames: np.ndarray, rows: np.ndarray, length: float) -> float:
-    """Largest difference of interpolated frames, in what the eye sees."""
+def _error(t: np.ndarray, frames: np.ndarray, rows: np.ndarray, length: float, acting: np.ndarray | None = None) -> float:
+    """Largest difference of interpolated frames and arrows, in what the eye sees."""
     right = np.clip(np.searchsorted(rows, np.arange(len(t)), side="left"), 1, len(rows) - 1)
     a, b = rows[right - 1], rows[right]
     span = t[b] - t[a]
@@ -142,7 +123,8 @@ def _error(t: np.ndarray, frames: np.ndarray, rows: np.ndarray, length: float) -
     moved = np.abs(between[..., :3] - frames[..., :3]).max(initial=0.0)
     # Entries of a rotation on the chord: what is left after it is made one again is smaller.
     turned = np.abs(between[..., 3:] - frames[..., 3:]).max(initial=0.0)
-    return float(max(moved / (_SEEN * length), turned / (10 * _TURN)))
+    longer = 0.0 if acting is None else np.abs(acting[a] * (1 - w) + acting[b] * w - acting).max(initial=0.0)
+    return float(max(moved / (_SEEN * length), turned / (10 * _TURN), longer / _LONGER))
 
 
 def _quaternions(R: np.ndarray) -> np.ndarray:

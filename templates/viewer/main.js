@@ -75,11 +75,12 @@ function toolbar(parent, stage, live) {
     choice(parent, "follow ", [[-1, "nothing"], ...bodies], k => stage.setFollow(k));
     if (live) return;
     choice(parent, "trail ", [[-2, "none"], [-1, "all"], ...bodies], k => { stage.trail = k; stage.invalidate(); });
-    const some = name => stage.scenes.some(s => s.source[name]);
-    if (!some("forces") && !some("contacts") && !some("loads")) return;
-    if (some("forces")) layer("forces", "forces in joints");
-    if (some("loads")) layer("loads", "loads");
-    if (some("contacts")) layer("contacts", "contacts");
+    const kinds = new Map(stage.scenes.flatMap(s => s.source.arrows.map(({ layer, title }) => [layer, title])));
+    if (!kinds.size) return;
+    for (const [name, title] of kinds) {
+        stage.layers[name] = true;
+        layer(name, title);
+    }
     slider(parent, { name: "length of arrows", least: 0.1, most: 10, value: 1 }, (v, show) => { stage.forceScale = v; show(v); stage.invalidate(); });
 }
 

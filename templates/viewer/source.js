@@ -157,9 +157,8 @@ class Recorded extends Source {
         this.o = columnsOf(data.origins);
         this.quaternions = columnsOf(data.turns);
         this.etas = data.eta ? columnsOf(data.eta.values) : [];
-        this.forces = data.forces ? columnsOf(data.forces.values) : null;
-        this.loads = data.loads ? columnsOf(data.loads.values) : null;
-        this.contacts = data.contacts ? columnsOf(data.contacts.values) : null;
+        // What acts: at points of the mechanism its vectors, else places and vectors in turn.
+        this.arrows = data.arrows.map(arrows => ({ ...arrows, color: colorOf(arrows.color), columns: columnsOf(arrows.values), now: [] }));
         this.seek(this.t[0]);
     }
 
@@ -192,9 +191,8 @@ class Recorded extends Source {
         this.data.points.forEach((p, k) => this.points.set(this.world(...p), 3 * k));
         this.data.axes.forEach((p, k) => this.axes.set(this.world(...p, true), 3 * k));
         this.etas.forEach((column, k) => { this.eta[this.data.eta.names[k]] = between(column); });
-        if (this.forces) this.force = this.forces.map(between);
-        if (this.loads) this.load = this.loads.map(between);
         // Contacts open and close: between two times the nearer one holds.
-        if (this.contacts) this.touch = this.contacts.map(column => column[w < 0.5 ? a : b]);
+        const near = column => column[w < 0.5 ? a : b];
+        for (const arrows of this.arrows) arrows.columns.forEach((column, k) => { arrows.now[k] = (arrows.layer === "contacts" ? near : between)(column); });
     }
 }

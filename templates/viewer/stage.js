@@ -16,7 +16,7 @@ class Stage {
         this.ahead = this.planar ? [0, 0, 1] : Math.abs(this.up[0]) > 0.9 ? [0, 1, 0] : [1, 0, 0];
         this.side = cross(this.up, this.ahead);
         this.length = Math.max(...scenes.map(s => s.data.length));
-        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true, loads: true, contacts: true };
+        this.layers = { names: false, frames: false, centres: false, inertia: false };
         this.forceScale = 1;
         this.follow = -1;
         this.trail = -2;
@@ -163,9 +163,7 @@ class Stage {
         this.drawTrails(scene);
         if (this.layers.inertia) for (const item of scene.items) if (item.kind === "ellipsoid") this.drawItem(scene, item);
         if (data.water) this.drawWater(scene);
-        if (this.layers.forces && source.force) this.drawForces(scene);
-        if (this.layers.loads && source.load) this.drawLoads(scene);
-        if (this.layers.contacts && source.touch) this.drawContacts(scene);
+        for (const arrows of source.arrows || []) if (this.layers[arrows.layer] !== false) this.drawArrows(scene, arrows);
     }
 
     drawWater(scene) {
@@ -285,47 +283,36 @@ class Stage {
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
 
-    // Metres of an arrow by its newtons or newton metres: the largest one of the motion has the same length in every picture.
-    scaleOf(largest) {
-        return 0.35 * this.length * this.forceScale / (largest || 1);
-    }
-
-    drawForces(scene) {
-        const { source, data } = scene, scale = this.scaleOf(data.forces.largest), color = colorOf("#B45309");
-        data.forces.joints.forEach((name, j) => this.arrow(scene, source.at(2 * j + 1), source.force.slice(3 * j, 3 * j + 3), scale, color,
-            `force of ${name}`));
-    }
-
-    // Forces and torques of loads on their bodies, at the points where they act.
-    drawLoads(scene) {
-        const { source, data } = scene, { names, kinds, largest } = data.loads;
+    // What of one kind acts now, to its scale.
+    drawArrows(scene, { layer, names, points, scale, longest, color, unit, now }) {
+        const { source } = scene, wide = points.length ? 3 : 6;
         names.forEach((name, k) => {
-            const at = source.load.slice(6 * k, 6 * k + 3), f = source.load.slice(6 * k + 3, 6 * k + 6), turns = kinds[k] === "torque";
-            this.arrow(scene, at, f, this.scaleOf(largest[kinds[k]]), colorOf(turns ? "#7C3AED" : "#047857"), name, turns);
+            const at = points.length ? source.at(points[k]) : now.slice(wide * k, wide * k + 3), f = now.slice(wide * k + wide - 3, wide * k + wide);
+            const n = size(f), long = this.forceScale * Math.min(n * scale, longest ?? Infinity);
+            if (!(long >= 0.01 * this.length)) return;
+            // Nothing hides a force.
+            this.renderer.over(true);
+            const draw = layer !== "torques" ? this.arrow : this.planar ? this.arc : this.twoHeads;
+            draw.call(this, scene, at, times(f, long / n), color, `${name}: ${n.toPrecision(4)} ${unit}`);
+            this.renderer.over(false);
         });
     }
 
-    // Forces of contacts on their first bodies; the usual one has the same length as in stills.
-    drawContacts(scene) {
-        const { source, data } = scene, { names, usual, length, longest } = data.contacts, color = colorOf("#D55E00");
-        names.forEach((name, k) => {
-            const at = source.touch.slice(6 * k, 6 * k + 3), f = source.touch.slice(6 * k + 3, 6 * k + 6), n = size(f);
-            if (n > 0) this.arrow(scene, at, f, length * this.length * this.forceScale * Math.min(1 / usual, longest / n), color, `contact ${name}`);
-        });
+    arrow(scene, a, way, color, name, heads = 1) {
+        const long = size(way), r = 0.007 * this.length, share = Math.min(5 * r / long, 0.5 / heads), b = add(a, way);
+        this.rod(scene, a, add(b, way, -heads * share), [r, r], color, name);
+        for (let k = 0; k < heads; k++) this.rod(scene, add(b, way, -(k + 1) * share), add(b, way, -k * share), [2.4 * r, 0.01 * r], color);
     }
 
-    // A torque has a second head.
-    arrow(scene, a, f, scale, color, name, turns = false) {
-        const n = size(f);
-        if (n * scale < 0.01 * this.length) return;
-        const b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5 / (1 + turns));
-        const neck = add(b, f, -scale * head), second = add(neck, f, -scale * head);
-        // Nothing hides a force.
-        this.renderer.over(true);
-        this.rod(scene, a, turns ? second : neck, [r, r], color, `${name}: ${n.toPrecision(4)} ${turns ? "N m" : "N"}`);
-        this.rod(scene, neck, b, [2.4 * r, 0.01 * r], color);
-        if (turns) this.rod(scene, second, neck, [2.4 * r, 0.01 * r], color);
-        this.renderer.over(false);
+    twoHeads(scene, a, way, color, name) { this.arrow(scene, a, way, color, name, 2); }
+
+    // A torque about what a plane is seen along: three quarters of a circle around its point, with a head.
+    arc(scene, a, way, color, name) {
+        const sense = Math.sign(way[2]) || 1, radius = 0.5 * size(way), corners = 24;
+        const at = k => { const p = sense * TURN * (-1 / 8 + 3 / 4 * k / corners); return add(a, [Math.cos(p), Math.sin(p), 0], radius); };
+        const r = 0.007 * this.length, last = Math.max(1, corners - Math.ceil(5 * r / (radius * TURN * 3 / 4 / corners)));
+        for (let k = 1; k <= last; k++) this.rod(scene, at(k - 1), at(k), [r, r], color, name);
+        this.rod(scene, at(last), at(corners), [2.4 * r, 0.01 * r], color);
     }
 
     drawTrails(scene) {

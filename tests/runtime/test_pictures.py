@@ -28,6 +28,7 @@ image = pytest.importorskip("PIL.Image")
 from symdyn.pictures import animate, plot  # noqa: E402
 from symdyn.pictures.drawing import Drawing  # noqa: E402
 from symdyn.pictures.points import points_of  # noqa: E402
+from symdyn.pictures.solids import Solids  # noqa: E402
 
 ROOT = str(Path(symdyn.__file__).parents[1])
 OPTIONS: dict[str, dict[str, Any]] = {"n_link_pendulum": {"n": 3}, "spatial_chain": {"n": 4}, "prismatic_chain": {"n": 3}}
@@ -48,6 +49,28 @@ def motion(name: str, t: Any = (0.0, 1.0), **options: Any) -> Solution:
     if key not in _modules:
         _modules[key] = systems.get(name, **options).embedding().compile("numpy")
     return _modules[key].simulate(t, rtol=1e-5)
+
+
+def guessed(solution: Solution) -> Drawing:
+    """The picture where a module does not list its joints: its lines come from the motion."""
+    metadata = solution.module.metadata
+    listed = ("joint_points", "joint_axes")
+    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f not in listed))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solution.module, "metadata", fewer)
+        found = Drawing.of(solution)
+    assert found is not None and found.sticks is not None
+    return found
+
+
+def ends_of_items(solution: Solution, body: str) -> np.ndarray:
+    """Where the solids of a body begin and end at every time, (n_t, n, 3)."""
+    solids = Solids.of(solution)
+    assert solids is not None and solids.forms is not None
+    k = solution.module.metadata.bodies.index(body)
+    refs = [end for form in solids.forms.forms if form.item.body == k for end in form.item.ends]
+    posed = [solids.forms.hung.at(*pose) for pose in zip(solids.origins, solids.rotations, strict=True)]
+    return np.array([[at.at(ref) for ref in refs] for at in posed])
 
 
 def labels(figure: Any) -> list[str]:
@@ -219,10 +242,10 @@ def test_points_in_space_are_found_on_bodies_with_euler_parameters_and_moving_gr
 def test_bodies_reach_to_their_points() -> None:
     for name in ("two_link_arm", "three_link_arm"):
         solution = motion(name)
-        drawing = Drawing.of(solution)
-        assert drawing is not None
-        missed = np.abs(drawing.lines[-1] - solution.outputs["tip"][:, None]).max(axis=(0, 2))
-        assert missed.min() < 1e-12
+        tip = np.pad(solution.outputs["tip"], ((0, 0), (0, 3 - solution.outputs["tip"].shape[1])))
+        assert missed(ends_of_items(solution, solution.module.metadata.bodies[-1]), tip) < 1e-6
+        sticks = guessed(solution).sticks
+        assert sticks is not None and missed(sticks.lines[-1], solution.outputs["tip"]) < 1e-12
 
 
 def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
@@ -243,29 +266,32 @@ def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
 @pytest.mark.parametrize("name, options", [*[(name, OPTIONS.get(name, {})) for name in systems.names(constrained=False)],
                                            ("puma560", {"convention": "modified"})])
 def test_bodies_are_drawn_rigid_and_joined(name: str, options: dict[str, Any]) -> None:
-    drawing = Drawing.of(motion(name, **options))
-    assert drawing is not None
+    solution = motion(name, **options)
+    drawing, listed = guessed(solution), Drawing.of(solution)
+    assert listed is not None and listed.sticks is None and listed.labels == drawing.labels
     assert drawing.spatial == (name in ("spatial_chain", "three_link_arm", "puma560", "flyball_governor"))
-    points = [line[:, k] for line in drawing.lines for k in range(line.shape[1])]
+    sticks = drawing.sticks
+    assert sticks is not None
+    points = [line[:, k] for line in sticks.lines for k in range(line.shape[1])]
     size = max(float(np.ptp(np.array(points), axis=(0, 1)).max()), 1e-3)
-    for k, line in enumerate(drawing.lines):
+    for k, line in enumerate(sticks.lines):
         lengths = np.linalg.norm(np.diff(line, axis=1), axis=2)
         assert np.ptp(lengths, axis=0).max(initial=0.0) < 1e-4 * size
-        if k in drawing.sliders:
+        if k in sticks.sliders:
             continue
-        others = [p for j, other in enumerate(drawing.lines) if j != k for p in np.moveaxis(other, 1, 0)]
-        others += [np.broadcast_to(pivot, line[:, 0].shape) for pivot in drawing.pivots]
+        others = [p for j, other in enumerate(sticks.lines) if j != k for p in np.moveaxis(other, 1, 0)]
+        others += [np.broadcast_to(pivot, line[:, 0].shape) for pivot in sticks.pivots]
         assert min(np.abs(line[:, 0] - p).max() for p in others) < 1e-4 * size, f"body {k} hangs in the air"
 
 
 def test_a_double_pendulum_is_two_rods_from_the_pivot() -> None:
     solution = motion("double_pendulum")
-    drawing = Drawing.of(solution)
-    assert drawing is not None and list(drawing.labels) == ["x", "y"] and not drawing.sliders
-    assert np.allclose(drawing.pivots, [[0.0, 0.0]])
+    drawing = guessed(solution)
+    assert drawing.sticks is not None and list(drawing.labels) == ["x", "y"] and not drawing.sticks.sliders
+    assert np.allclose(drawing.sticks.pivots, [[0.0, 0.0]])
     a, b = solution.q[:, 0], solution.q.sum(axis=1)
     hinge = np.column_stack([np.cos(a), np.sin(a)])
-    upper, lower = drawing.lines
+    upper, lower = drawing.sticks.lines
     assert np.abs(np.linalg.norm(upper, axis=2).max(axis=1) - 1.0).max() < 1e-9
     assert np.abs(upper - hinge[:, None]).max(axis=2).min(axis=1).max() < 1e-9
     assert np.allclose(lower[:, 0], hinge)
@@ -274,9 +300,9 @@ def test_a_double_pendulum_is_two_rods_from_the_pivot() -> None:
 
 def test_a_cart_is_a_slider_that_carries_its_pole() -> None:
     solution = motion("cart_pole")
-    drawing = Drawing.of(solution)
-    assert drawing is not None and list(drawing.sliders) == [0] and not len(drawing.pivots)
-    assert np.allclose(drawing.lines[1][:, 0], np.column_stack([solution.q[:, 0], np.zeros(len(solution.t))]))
+    sticks = guessed(solution).sticks
+    assert sticks is not None and list(sticks.sliders) == [0] and not len(sticks.pivots)
+    assert np.allclose(sticks.lines[1][:, 0], np.column_stack([solution.q[:, 0], np.zeros(len(solution.t))]))
 
 
 def test_a_joint_away_from_both_origins_is_found() -> None:
@@ -287,10 +313,10 @@ def test_a_joint_away_from_both_origins_is_found() -> None:
         system.add_joint(symdyn.Revolute(f"j{k}", system.ground if k == 0 else "b0", body, q, child_point=[-0.5, 0],
                                          parent_point=[0, 0] if k == 0 else [0.5, 0]))
     solution = system.embedding().compile("numpy").simulate((0.0, 1.0), q=[0.3, 0.4])
-    drawing = Drawing.of(solution)
-    assert drawing is not None
+    sticks = guessed(solution).sticks
+    assert sticks is not None
     hinge = np.column_stack([np.cos(solution.q[:, 0]), np.sin(solution.q[:, 0])])
-    assert np.abs(drawing.lines[1][:, 0] - hinge).max() < 1e-6
+    assert np.abs(sticks.lines[1][:, 0] - hinge).max() < 1e-6
 
 
 @pytest.mark.parametrize("joint", [lambda *n, **p: symdyn.Helical(*n, pitch=0.1, **p), symdyn.Cylindrical])
@@ -298,22 +324,22 @@ def test_a_nut_slides_on_its_screw_wherever_their_origins_are(joint: Any) -> Non
     system = symdyn.System("screw", gravity=[1, 0, -9.81])
     nut = system.add_body("nut", mass=3, inertia=[2, 3, 4], com=[0.3, 0.1, 0.2])
     system.add_joint(joint("thread", system.ground, nut, child_point=[0.2, 0.3, 0], parent_point=[0.1, 0.2, 0.3]))
-    drawing = Drawing.of(system.embedding().compile("numpy").simulate((0.0, 1.0)))
-    assert drawing is not None and list(drawing.sliders) == [0]
+    sticks = guessed(system.embedding().compile("numpy").simulate((0.0, 1.0))).sticks
+    assert sticks is not None and list(sticks.sliders) == [0]
 
 
 def test_a_body_that_tumbles_is_on_no_screw() -> None:
     system = symdyn.System("tumbling", gravity=[0, 0, -9.81])
     body = system.add_body("body", mass=3, inertia=[2, 3, 4])
     system.add_joint(symdyn.Free("float", system.ground, body, velocity="body", child_point=[0.2, 0.3, 0]))
-    drawing = Drawing.of(system.embedding().compile("numpy").simulate((0.0, 1.0), u=[1, 0, 0, 0.1, 2, 0.2]))
-    assert drawing is not None and not drawing.sliders and not len(drawing.pivots)
+    sticks = guessed(system.embedding().compile("numpy").simulate((0.0, 1.0), u=[1, 0, 0, 0.1, 2, 0.2])).sticks
+    assert sticks is not None and not sticks.sliders and not len(sticks.pivots)
 
 
 def test_bodies_at_rest_are_drawn() -> None:
     solution = motion("pendulum").module.simulate((0.0, 1.0), q=[0.0])
-    drawing = Drawing.of(solution)
-    assert drawing is not None and np.allclose(drawing.pivots, 0.0)
+    sticks = guessed(solution).sticks
+    assert sticks is not None and np.allclose(sticks.pivots, 0.0)
     assert plot(solution)._repr_png_()
 
 
@@ -350,33 +376,33 @@ def missed(points: np.ndarray, wanted: np.ndarray) -> float:
 def test_bodies_meet_at_every_joint_of_their_loops(name: str, coordinates: str, options: dict[str, Any]) -> None:
     solution = loop(name, coordinates, (0.0, 0.01 if name == "andrews_squeezer" else 0.1), **options)
     drawing, metadata = Drawing.of(solution), solution.module.metadata
-    assert drawing is not None
-    shown = ["xyz".index(label) for label in drawing.labels]
+    assert drawing is not None and drawing.sticks is None and drawing.solids is not None and drawing.solids.forms is not None
     size = np.ptp(drawing.limits(), axis=1).max()
+    drawn = {form.item.body for form in drawing.solids.forms.forms if form.item.kind == "rod"}
     for joint, kind in zip(metadata.reactions, metadata.reaction_kinds, strict=True):
         ends = ends_of(solution, joint)
         if kind not in ("rod", "prismatic"):
             assert np.abs(ends[0][1] - ends[1][1]).max() < 1e-6 * size, joint
         elif kind == "rod":
             assert np.ptp(np.linalg.norm(ends[0][1] - ends[1][1], axis=1)) < 1e-6 * size
-            assert all(missed(drawing.rods, point[:, shown]) < 1e-12 for _, point in ends)
         for body, point in ends:
-            if body != "ground":
-                assert missed(drawing.lines[metadata.bodies.index(body)], point[:, shown]) < 1e-5 * size, f"{joint} on {body}"
-            elif kind != "prismatic":
-                assert missed(np.broadcast_to(drawing.pivots, (len(point), *drawing.pivots.shape)), point[:, shown]) < 1e-12
-    for line in drawing.lines:
-        assert np.ptp(np.linalg.norm(np.diff(line, axis=1), axis=2), axis=0).max(initial=0.0) < 1e-6 * size
+            if body != "ground" and metadata.bodies.index(body) in drawn:
+                assert missed(ends_of_items(solution, body), point) < 1e-5 * size, f"{joint} on {body}"
+            assert missed(drawing.points, point[:, drawing.axes]) < 1e-5 * size
 
 
 @pytest.mark.parametrize("coordinates", ["relative", "absolute"])
 def test_the_rocker_of_a_four_bar_linkage_reaches_to_the_ground(coordinates: str) -> None:
     solution = loop("four_bar", coordinates)
     drawing = Drawing.of(solution)
-    assert drawing is not None and np.allclose(drawing.pivots, [[0.0, 0.0], [2.0, 0.0]])
-    assert [line.shape[1] for line in drawing.lines] == [2, 2, 2]
-    lengths = [np.linalg.norm(np.diff(line, axis=1), axis=2) for line in drawing.lines]
-    assert all(np.allclose(found, wanted, atol=1e-6) for found, wanted in zip(lengths, (0.8, 2.0, 1.6), strict=True))
+    assert drawing is not None and drawing.solids is not None and drawing.solids.forms is not None
+    items = [form.item for form in drawing.solids.forms.forms]
+    rods = [item for item in items if item.kind == "rod"]
+    posed = [drawing.solids.forms.hung.at(*pose) for pose in zip(drawing.solids.origins, drawing.solids.rotations, strict=True)]
+    for rod, wanted in zip(rods, (0.8, 2.0, 1.6), strict=True):
+        assert np.allclose([np.linalg.norm(at.at(rod.ends[1]) - at.at(rod.ends[0])) for at in posed], wanted, atol=1e-6)
+    stands = [[at.at(item.ends[0]) for at in posed] for item in items if item.kind == "stand"]
+    assert np.allclose(np.array(stands)[:, 0], [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
 
 
 def test_a_screw_in_absolute_coordinates_has_no_carrier_in_its_picture() -> None:
@@ -388,9 +414,11 @@ def test_a_screw_in_absolute_coordinates_has_no_carrier_in_its_picture() -> None
     solution = system.augmented("absolute").compile("numpy").simulate((0.0, 0.5))
     assert list(solution.module.metadata.bodies) == ["arm", "nut", "thread_carrier"]
     drawing = Drawing.of(solution)
-    assert drawing is not None and len(drawing.lines) == drawing.centres.shape[1] == 2 and dict(drawing.sliders) == {1: [0]}
+    assert drawing is not None and drawing.centres.shape[1] == 2
+    assert drawing.solids is not None and drawing.solids.forms is not None
+    assert {form.item.body for form in drawing.solids.forms.forms} <= {0, 1, -1}
     place = solution.frames[:, 1, :3] + solution.frames[:, 1, 3:].reshape(-1, 3, 3) @ [0.2, 0.3, 0]
-    assert np.abs(drawing.lines[1][:, 0] - place).max() < 1e-6
+    assert missed(ends_of_items(solution, "nut"), place) < 1e-6
     assert np.allclose(solution.reaction("thread", "child"), solution.reaction("thread", "nut"))
 
 
@@ -407,30 +435,30 @@ def test_a_loop_closed_by_a_guide_has_a_slider_on_a_rail(flipped: bool) -> None:
     system.close_loop(symdyn.Prismatic("guide", *ends, axis=[1, 0, 0]))
     lean = np.arcsin(0.5 * np.sin(0.7))
     system.initial = {q[0]: 0.7, q[1]: -0.7 - lean, q[2]: lean}
-    drawing = Drawing.of(system.augmented().compile("numpy").simulate((0.0, 0.2)))
-    assert drawing is not None and dict(drawing.sliders) == {2: [0]} and np.allclose(drawing.pivots, 0.0)
-    assert drawing.pivots.shape == (1, 2) and missed(drawing.rails, drawing.lines[2][:, 0]) < 1e-12
-    assert missed(drawing.lines[1], drawing.lines[2][:, 0]) < 1e-6
+    solution = system.augmented().compile("numpy").simulate((0.0, 0.2))
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.solids is not None and drawing.solids.forms is not None
+    kinds = [form.item.kind for form in drawing.solids.forms.forms]
+    assert kinds.count("block") == 1 and kinds.count("stand") == 1
+    (k,) = [k for k, kind in enumerate(kinds) if kind == "block"]
+    middles = np.array([drawing.solids.vertices(i)[k].mean(axis=0) for i in range(len(solution.t))])
+    (_, (_, guide)) = ends_of(solution, "guide") if not flipped else ends_of(solution, "guide")[::-1]
+    assert np.allclose(middles, guide, atol=1e-6) and np.allclose(middles[:, 1:], 0.0, atol=1e-6)
+    assert missed(ends_of_items(solution, "rod"), guide) < 1e-5
 
 
 def test_what_a_joint_of_the_user_does_is_seen_in_its_motion() -> None:
     for name in ("pendulum_absolute", "skate"):
-        drawing = Drawing.of(loop(name))
-        assert drawing is not None and not drawing.sliders and not len(drawing.pivots) and drawing.rails.shape[1] == 1
+        sticks = guessed(loop(name)).sticks
+        assert sticks is not None and not sticks.sliders and not len(sticks.pivots) and sticks.rails.shape[1] == 1
 
 
-def test_bodies_without_joints_that_are_told_are_joined_as_they_move() -> None:
+def test_bodies_without_joints_that_are_listed_are_joined_as_they_move() -> None:
     solution = motion("double_pendulum")
-    told = Drawing.of(solution)
-    metadata = solution.module.metadata
-    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f != "joint_points"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solution.module, "metadata", fewer)
-        assert "joint_points" not in solution.module.functions
-        guessed = Drawing.of(solution)
-    assert told is not None and guessed is not None and np.allclose(told.pivots, guessed.pivots)
-    for a, b in zip(told.lines, guessed.lines, strict=True):
-        assert np.abs(a[:, 0] - b[:, 0]).max() < 1e-6
+    sticks, points = guessed(solution).sticks, solution.rows("joint_points").reshape(len(solution.t), -1, 6)
+    assert sticks is not None and np.allclose(sticks.pivots, points[0, :1, :2])
+    for k, line in enumerate(sticks.lines):
+        assert np.abs(line[:, 0] - points[:, k, 3:5]).max() < 1e-6
 
 
 # -- films

@@ -11,7 +11,6 @@ import pytest
 
 import symdyn as sd
 from symdyn.pictures import arrows
-from symdyn.pictures.bodies import FORCE
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.looks import looks_of
 from symdyn.pictures.mechanism import mechanism_of
@@ -40,7 +39,8 @@ def test_arrows_are_at_the_contacts_along_their_forces(landing: Any) -> None:
     assert forces[slides].sum(axis=0) == pytest.approx([-0.4 * 2 * G, 2 * G, 0], rel=1e-9)
     drawing = Drawing.of(landing)
     assert drawing is not None
-    ways = drawing.pushes - drawing.touches
+    (drawn,) = drawing.arrows
+    ways = drawn.ways
     parallel = ways[slides, :, 0] * forces[slides, :, 1] - ways[slides, :, 1] * forces[slides, :, 0]
     assert np.abs(parallel).max() < 1e-12
     assert (ways[slides:, :, 1] > 0).all()
@@ -49,14 +49,16 @@ def test_arrows_are_at_the_contacts_along_their_forces(landing: Any) -> None:
 def test_heads_of_arrows_end_at_their_tips() -> None:
     for n in (2, 3):
         tails, tips = np.zeros((2, n)), np.eye(n)[[0, -1]] * 2.0
-        curve = arrows.arrows(tails, tips).reshape(2, -1, n)
+        curve = arrows.straight(tails, tips).reshape(2, -1, n)
         assert np.isnan(curve[:, -1]).all() and (curve[:, 1] == tips).all()
         barbs = curve[:, 2:-1:2]
         assert np.linalg.norm(barbs - tips[:, None], axis=2) == pytest.approx(2 * np.hypot(arrows.HEAD, arrows.WIDTH))
         assert barbs.shape[1] == 2 * (n - 1)
-    assert arrows.arrow_scale(np.full((1, 1, 2), np.nan), 1.0).item() == 0
-    sizes = arrows.arrow_scale(np.array([[[1.0, 0.0]], [[1.0, 0.0]], [[100.0, 0.0]]]), 1.0)
-    assert (sizes[:, 0, 0] * [1, 1, 100]).tolist() == pytest.approx([arrows.LENGTH, arrows.LENGTH, 2 * arrows.LENGTH])
+        torque = arrows.straight(tails, tips, 2).reshape(2, -1, n)
+        assert np.nanmax(np.abs(torque[:, :-1] - tips[:, None] * (1 - arrows.BEHIND)).sum(axis=2).min(axis=1)) < 1e-12
+    forces = np.array([[[1.0, 0, 0]], [[1.0, 0, 0]], [[100.0, 0, 0]]])
+    ways = arrows.Arrows("contacts", ["one"], 0 * forces, forces, arrows.LENGTH, arrows.LENGTH * arrows.LONGEST).ways
+    assert ways[:, 0, 0].tolist() == pytest.approx([arrows.LENGTH, arrows.LENGTH, 2 * arrows.LENGTH])
 
 
 def test_plots_mark_changes_of_modes_and_films_have_arrows(landing: Any, tmp_path: Path) -> None:
@@ -65,7 +67,7 @@ def test_plots_mark_changes_of_modes_and_films_have_arrows(landing: Any, tmp_pat
     marks = {float(np.asarray(line.get_xdata())[0]) for line in figure.axes[0].lines if line.get_linestyle() == ":"}
     assert {lands, rests} <= marks
     shown = landing.picture(1.0).axes[0]
-    curves = [line for line in shown.lines if line.get_color() == FORCE]
+    curves = [line for line in shown.lines if line.get_color() == arrows.COLORS["contacts"]]
     assert len(curves) == 2 and np.asarray(curves[1].get_xdata()) == pytest.approx(landing["x"][-1] + np.array([-0.2, 0.2]))
     landing.animate(tmp_path / "film.gif", fps=5)
     assert (tmp_path / "film.gif").stat().st_size > 0
@@ -116,8 +118,9 @@ def test_flat_ground_is_drawn_where_it_is_touched(landing: Any) -> None:
 def test_pages_carry_the_forces_of_contacts(landing: Any) -> None:
     """As they are at the stored times, to sixteen bits."""
     data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', landing.view().html, re.S)[1])["motions"][0]  # type: ignore[index]
-    contacts = data["contacts"]
-    assert contacts["names"] == ["left", "right"] and data["ground"] == pytest.approx(0.0, abs=1e-9)
+    (contacts,) = data["arrows"]
+    assert contacts["names"] == ["contact left", "contact right"] and contacts["layer"] == "contacts"
+    assert data["ground"] == pytest.approx(0.0, abs=1e-9)
     packed = contacts["values"]
     columns = np.frombuffer(base64.b64decode(packed["data"]), "<u2").reshape(packed["columns"], -1)
     last = np.array(packed["low"]) + np.array(packed["step"]) * columns[:, -1]

@@ -278,9 +278,43 @@ def test_the_eye_is_where_the_axes_say() -> None:
 
 def test_polygons_are_cut_at_the_water() -> None:
     square = np.array([[0, 0, -1], [2, 0, -1], [2, 0, 3], [0, 0, 3.0]])
-    below, above = cut(square, 0.0)
+    below, above = cut(square, square[:, 2])
     assert below[:, 2].max() == 0 == above[:, 2].min()
     assert np.ptp(below[:, 2]) == 1 and np.ptp(above[:, 2]) == 3 and len(below) == len(above) == 4
+
+
+def test_water_with_waves_moves_in_stills_and_parts_what_stands_in_it() -> None:
+    """Strips follow the elevation a cos(w t - k s) along the heading, and a pole is under water up to where the surface is."""
+    amplitude, frequency, length, heading = 0.5, 0.8, 12.0, 0.6
+    system = sd.System("pole", gravity=[0, 0, -9.81])
+    pole = system.add_body("pole", mass=1, inertia=[1, 1, 1])
+    system.add_joint(sd.Prismatic("guide", system.ground, pole, axis=[0, 0, 1]))
+    system.draw("pole", S.Box([0.1, 0.1, 8.0]), color="#ff0000")
+    system.draw(system.ground, S.Water((20, 10), waves=(amplitude, frequency, length, heading, 0)))
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.3))
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.solids is not None and drawing.solids.water is not None
+    axes = make_axes(Figure(), 111, drawing, (20, -60))
+    scene = Scene(drawing.solids, [0, 1, 2])
+    axes.add_collection(scene, autolim=False)
+    camera = Camera.of(axes.get_proj())
+    for index in (0, 700, 1000):
+        scene.place(index)
+        time = solution.t[index]
+        strips = [strip for strip, _ in scene._surface(drawing.solids.water, camera)]
+        corners = np.concatenate(strips)
+        along = corners[:, :2] @ [np.cos(heading), np.sin(heading)]
+        wanted = amplitude * np.cos(frequency * time - 2 * np.pi / length * along)
+        assert np.allclose(corners[:, 2], wanted, atol=1e-12)
+        assert len(strips) >= 24 and np.allclose(np.ptp(corners[:, :2], axis=0), [20, 10])
+        areas = [np.cross(strip[1:-1] - strip[0], strip[2:] - strip[0])[:, 2].sum() / 2 for strip in strips]
+        assert np.abs(areas).sum() == pytest.approx(200.0)
+        scene.do_3d_projection()
+        wet = int(scene.get_facecolor()[:, 3].argmin())
+        red = [path.vertices for path in scene.get_paths()][:wet]
+        surface = camera.project(np.array([[0.0, 0.0, amplitude * np.cos(frequency * time)]]))[0, 1]
+        near = camera.project(np.array([[0.05, -0.05, amplitude * np.cos(frequency * time)]]))[0, 1]
+        assert max(polygon[:, 1].max() for polygon in red) == pytest.approx(surface, abs=2 * abs(near - surface))
 
 
 @pytest.mark.parametrize("elevation", [20, -20])
@@ -331,9 +365,18 @@ def test_a_box_hides_the_one_behind_it(tmp_path: Any) -> None:
 def test_shapes_stand_for_the_lines_of_their_bodies() -> None:
     system = buoy()
     system.draw("hull", S.Box([4, 3, 1]))
-    drawing = Drawing.of(system.embedding().compile("numpy").simulate((0.0, 0.2)))
-    assert drawing is not None and drawing.spatial and list(drawing.bare) == [1]
-    assert np.isnan(drawing.lines[0]).all() and np.isfinite(drawing.lines[1]).all()
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.2))
+    drawing = Drawing.of(solution)
+    assert drawing is not None and drawing.spatial and drawing.sticks is None
+    assert drawing.solids is not None and drawing.solids.forms is not None
+    assert {part.body for part in drawing.solids.own} == {0}
+    assert {form.item.body for form in drawing.solids.forms.forms if form.item.axis < 0} == {1}
+    fewer = tuple(f for f in solution.module.functions if f != "joint_points")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solution.module, "metadata", dataclasses.replace(solution.module.metadata, functions=fewer))
+        lines = Drawing.of(solution)
+    assert lines is not None and lines.sticks is not None and list(lines.bare) == [1]
+    assert np.isnan(lines.sticks.lines[0]).all() and np.isfinite(lines.sticks.lines[1]).all()
     assert (np.ptp(drawing.limits(), axis=1) > [4, 3, 1]).all()
 
 

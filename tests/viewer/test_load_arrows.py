@@ -16,6 +16,11 @@ from tests.viewer.test_views import Opened
 
 pytest.importorskip("matplotlib")
 
+from matplotlib.colors import to_rgb
+
+from symdyn.pictures.arrows import LARGEST
+from symdyn.pictures.drawing import Drawing
+
 
 def of_all_kinds(gravity: float = 0.0) -> sd.System:
     """A slider and two links in space, with a load of every kind."""
@@ -49,9 +54,12 @@ def module() -> Module:
     return of_all_kinds().compile(backend="numpy")
 
 
-def test_loads_on_bodies_are_worth_the_generalized_forces(module: Module) -> None:
-    """By virtual power: J^T of all forces and torques on the bodies, from their points, is F_tilde without a weight."""
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_loads_on_bodies_are_worth_the_generalized_forces(gravity: float) -> None:
+    """By virtual power: J^T of all forces, weights and torques on the bodies, from their points, is F_tilde."""
     rng = np.random.default_rng(3)
+    module = of_all_kinds(gravity).compile(backend="numpy")
+    assert ("weights" in module.functions) == bool(gravity)
     bodies = module.metadata.bodies
     assert {kind for _, _, kind in module.metadata.acting} == {"force", "torque"}
     for _ in range(3):
@@ -63,6 +71,8 @@ def test_loads_on_bodies_are_worth_the_generalized_forces(module: Module) -> Non
         for (at, acts), (_, body, kind) in zip(rows, module.metadata.acting, strict=True):
             k = bodies.index(body)
             wrenches[k] += np.concatenate([acts, np.cross(at - centres[k], acts)] if kind == "force" else [np.zeros(3), acts])
+        if gravity:
+            wrenches[:, :3] += module.evaluate("weights", 0.0, x).reshape(-1, 3)
         J = module.evaluate("J", 0.0, x).reshape(-1, 3)
         np.testing.assert_allclose(J.T @ wrenches.ravel(), module.evaluate("F_tilde", 0.0, x).ravel(), rtol=1e-12, atol=1e-12)
 
@@ -72,20 +82,98 @@ def test_loads_can_be_seen_and_hidden(module: Module, chromium: Any, tmp_path: P
     solution = module.simulate((0, 0.2))
     solution.view(tmp_path / "view.html", forces=True)
     with Opened(chromium, tmp_path / "view.html") as opened:
-        data = opened.page.evaluate("symdyn.scenes[0].data.loads")
-        assert data["kinds"].count("torque") == 5 and "push on cart" in data["names"]
+        layers = {one["layer"]: one for one in opened.page.evaluate("symdyn.scenes[0].source.arrows")}
+        assert set(layers) == {"forces", "loads", "torques"}
+        data = layers["loads"]
+        assert len(layers["torques"]["names"]) == 5 and "push on cart" in data["names"]
         rows = module.evaluate("applied_loads", 0.0, solution.x[0]).reshape(-1, 6)
-        there = np.abs(solution.rows("applied_loads").reshape(len(solution.t), -1, 6)[..., 3:]).max(axis=(0, 2)) > 0
-        load = np.array(opened.page.evaluate("symdyn.scenes[0].source.load")).reshape(-1, 6)
-        np.testing.assert_allclose(load, rows[there], atol=2e-3 * np.abs(rows).max())
+        every = solution.rows("applied_loads").reshape(len(solution.t), -1, 6)
+        own = [k for k, (*_, kind) in enumerate(module.metadata.acting) if kind == "force" and every[:, k, 3:].any()]
+        load = np.array(data["now"]).reshape(-1, 6)
+        np.testing.assert_allclose(load, rows[own], atol=2e-3 * np.abs(rows).max())
         k = data["names"].index("push on cart")
         picks = opened.page.evaluate("symdyn.scenes[0].picks.filter(p => p.name.startsWith('push on cart'))")
         assert picks[0]["name"] == "push on cart: 3.742 N"
         np.testing.assert_allclose(picks[0]["a"], load[k, :3], atol=1e-6)
         seen = opened.pixels()
-        opened.page.get_by_label("loads").uncheck()
+        opened.page.get_by_label("forces of loads").uncheck()
         assert (seen != opened.pixels()).any(axis=1).sum() > 300
         assert not opened.page.evaluate("symdyn.scenes[0].picks.some(p => p.name.startsWith('push'))")
+
+
+def test_stills_films_and_pages_have_the_same_arrows(chromium: Any, tmp_path: Path) -> None:
+    """Where they begin, along what, and how long, of every layer; the largest force and the largest torque as the page's length
+    says."""
+    solution = of_all_kinds(9.81).compile(backend="numpy").simulate((0, 0.2))
+    solution.view(tmp_path / "view.html", forces=True)
+    drawing = Drawing.of(solution, True)
+    assert drawing is not None and drawing.spatial
+    drawn = {one.arrows.layer: one for one in drawing.arrows}
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        opened.page.evaluate("() => { symdyn.scenes[0].source.seek(0.1); symdyn.stage.draw(false); }")
+        length = opened.page.evaluate("symdyn.stage.length")
+        shown = {one["layer"]: one for one in opened.page.evaluate("symdyn.scenes[0].source.arrows")}
+        picks = opened.page.evaluate("symdyn.scenes[0].picks")
+    assert set(shown) == set(drawn) == {"forces", "loads", "torques", "weights"}
+    still = drawing.at(solution.t, np.array([0.1])).arrows
+    largest = [one.ways for one in drawing.arrows if not one.arrows.turns]
+    assert max(np.linalg.norm(ways, axis=2).max() for ways in largest) == pytest.approx(LARGEST * length)
+    for one in still:
+        layer = shown[one.arrows.layer]
+        assert layer["names"] == one.arrows.names and layer["color"] == pytest.approx(to_rgb(one.arrows.color))
+        for name, tail, way in zip(one.arrows.names, one.tails[0], one.ways[0], strict=True):
+            if np.linalg.norm(way) < 0.02 * length:
+                continue
+            arrow = next(pick for pick in picks if pick["name"].startswith(f"{name}: ")
+                         and pick["name"].endswith(f" {one.arrows.unit}"))
+            np.testing.assert_allclose(arrow["a"], tail, atol=3e-3 * length)
+            stem = np.subtract(arrow["b"], arrow["a"])
+            # Between stored times arrows are off by 2 % of the largest, along each axis.
+            np.testing.assert_allclose(np.cross(stem, way), 0, atol=0.02 * 2**0.5 * LARGEST * length * np.linalg.norm(way))
+            assert 0.3 * np.linalg.norm(way) < np.linalg.norm(stem) < np.linalg.norm(way)
+    weights = drawn["weights"].arrows
+    np.testing.assert_allclose(weights.vectors[0], [[0, 0, -9.81 * m] for m in (2, 1, 1)])
+    np.testing.assert_allclose(weights.tails[0], solution.rows("positions").reshape(len(solution.t), -1, 3)[0])
+
+
+def test_stills_and_films_explain_their_arrows(tmp_path: Path) -> None:
+    solution = of_all_kinds(9.81).compile(backend="numpy").simulate((0, 0.2))
+    figure = solution.picture([0.0, 0.1], tmp_path / "forces.png", forces=True)
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[-1] == "weights, up to 19.6 N" and texts[2].startswith("torques of loads, up to") and texts[2].endswith(" N m")
+    colors = {line.get_color() for line in figure.axes[0].lines}
+    assert {line.get_color() for line in legend.get_lines()} <= colors
+    assert not solution.picture(0.0).legends
+    solution.animate(tmp_path / "forces.gif", fps=10, forces=True)
+    assert (tmp_path / "forces.gif").stat().st_size > 0
+    for show in (solution.picture, solution.animate):
+        with pytest.raises(sd.ArgumentError, match="loaded: forces is 'all'; pass True or False"):
+            show(forces="all")  # type: ignore[operator]
+
+
+def test_a_torque_in_a_plane_is_an_arc_that_turns_as_it_does(chromium: Any, tmp_path: Path) -> None:
+    """Counter-clockwise where it is positive, half the length of the arrow away from its point, with a head."""
+    tau = sd.inputs("tau")
+    system = sd.System("wheel", gravity=[0, -9.81])
+    wheel = system.add_body("wheel", mass=1, inertia=0.1)
+    system.add_joint(sd.Revolute("pin", system.ground, wheel, sd.coordinates("q")))
+    system.add_torque(wheel, tau, name="drive")
+    solution = system.compile(backend="numpy").simulate((0, 1), inputs={"tau": lambda t, x: 1 - 2 * t})
+    drawing = Drawing.of(solution, True)
+    assert drawing is not None and not drawing.spatial
+    (one,) = [one for one in drawing.arrows if one.arrows.turns]
+    length = LARGEST * drawing.solids.forms.length  # type: ignore[union-attr]
+    solution.view(tmp_path / "view.html", forces=True)
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        for index, sense in ((0, 1), (-1, -1)):
+            curve = one.curve(index)[:25]
+            np.testing.assert_allclose(np.linalg.norm(curve, axis=1), length / 2, rtol=1e-9)
+            assert sense * np.cross(np.pad(curve[0], (0, 1)), np.pad(curve[1], (0, 1)))[2] > 0
+            opened.page.evaluate("t => { symdyn.scenes[0].source.seek(t); symdyn.stage.draw(false); }", float(solution.t[index]))
+            picks = opened.page.evaluate("symdyn.scenes[0].picks.filter(p => p.name.startsWith('drive'))")
+            found = np.array([pick["a"] for pick in picks])
+            np.testing.assert_allclose(found[:, :2], curve[:len(found)], atol=1e-3 * length)
 
 
 def test_arrows_of_contacts_are_not_shown_twice() -> None:

@@ -194,7 +194,8 @@ def test_follow_trail_and_comparison(arm: Solution, chromium: Any, tmp_path: Pat
         frames = [arm.module.evaluate("frames", t, x, arm.params, idle).reshape(-1, 12)[body, :3]
                   for t, x in ((0.0, arm.x[0]), (1.0, way))]
         np.testing.assert_allclose(moved, frames[1] - frames[0], atol=3e-3)
-        force = np.array(opened.page.evaluate("symdyn.scenes[0].source.force")).reshape(-1, 3)
+        force = np.array(opened.page.evaluate(
+            "symdyn.scenes[0].source.arrows.find(a => a.layer === 'forces').now")).reshape(-1, 3)
         k = int(np.abs(arm.t - 1.0).argmin())
         wanted = arm.reactions["shoulder"]
         np.testing.assert_allclose(force[0], wanted[k, :3], atol=0.01 * np.abs(wanted).max())
@@ -233,12 +234,12 @@ def test_forces_of_contacts_can_be_seen_and_hidden(chromium: Any, tmp_path: Path
     with Opened(chromium, tmp_path / "view.html") as opened:
         opened.slide("t", 0.4)
         shown = opened.pixels()
-        opened.page.click("text=contacts")
+        opened.page.get_by_label("forces of contacts").click()
         assert (opened.pixels() != shown).any(axis=1).sum() > 50
-        opened.page.click("text=contacts")
+        opened.page.get_by_label("forces of contacts").click()
         assert (opened.pixels() == shown).all()
         # In the middle of the arrow, 0.22 of the length above the corner.
-        name = opened.page.evaluate("""() => { const s = symdyn.stage, at = symdyn.scenes[0].source.touch.slice(0, 3);
+        name = opened.page.evaluate("""() => { const s = symdyn.stage, at = symdyn.scenes[0].source.arrows[0].now.slice(0, 3);
             return s.pick(...s.project([at[0], at[1] + 0.1 * s.length, at[2]])); }""")
         assert name == "contact left: 9.810 N"
 

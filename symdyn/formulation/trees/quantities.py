@@ -134,6 +134,8 @@ class TreeQuantities(Motion):
             own["spring_points"] = self.spring_points
         if self.acting:
             own["applied_loads"] = self.applied_loads
+        if any(not is_zero(e) for e in self.gravity()):
+            own["weights"] = self.weights
         if self.model.compliant:
             own["compliant_contacts"] = self.compliant_contacts
         deep = any(contact.depth is not None for contact in self.model.compliant)
@@ -261,6 +263,11 @@ class TreeQuantities(Motion):
     def applied_loads(self) -> np.ndarray:
         """Where every force and torque of a load acts, m, and its vector, N or N m, n-frame, (n, 6)."""
         return applied_loads(self.loads, self.acting)
+
+    def weights(self) -> np.ndarray:
+        """Weight of every body, N, n-frame, (n_b, 3)."""
+        g = self.gravity()
+        return np.array([self.algebra.expression(body.mass) * g for body in self.model.bodies], dtype=object).reshape(-1, 3)
 
     def _on(self, body: Any, point: Any) -> Any:
         """A point of a body in the n-frame."""

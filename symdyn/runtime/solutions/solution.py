@@ -631,11 +631,12 @@ class Solution:
         return plot(self, path, view, show, style)
 
     def picture(self, t: Times | PathName | None = None, path: PathName | None = None,
-                view: Sequence[float] | Sequence[Sequence[float]] | None = None) -> Figure:
+                view: Sequence[float] | Sequence[Sequence[float]] | None = None, forces: bool = False) -> Figure:
         """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
         it if a path is given, which may also stand alone: picture("rest.png").
 
-        view   as for `plot`, or one for each picture
+        view     as for `plot`, or one for each picture
+        forces   with arrows of forces in joints, loads and weights, and of torques, as `view` has them
         Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
 
         >>> import tempfile
@@ -647,14 +648,15 @@ class Solution:
 
         if path is None and isinstance(t, (str, os.PathLike)):
             t, path = None, t
-        return picture(self, t, path, view)
+        return picture(self, t, path, view, forces)
 
     def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
-                view: Sequence[float] | None = None) -> FuncAnimation:
+                view: Sequence[float] | None = None, forces: bool = False) -> FuncAnimation:
         """The moving bodies; returns the matplotlib animation, and saves it if a path is given: as .gif, or as .mp4 where the
         program ffmpeg is installed.
 
-        fps    pictures a second; speed: seconds of motion in one second of film; view: as for `plot`
+        fps      pictures a second; speed: seconds of motion in one second of film; view: as for `plot`
+        forces   with arrows, as for `picture`
         Raises ArgumentError for another ending, for .mp4 without ffmpeg, and if nothing can be drawn.
 
         >>> import tempfile
@@ -664,15 +666,15 @@ class Solution:
         """
         from symdyn.pictures import animate
 
-        return animate(self, path, fps, speed, view)
+        return animate(self, path, fps, speed, view, forces)
 
     def view(self, path: PathName | None = None, compare: Solution | None = None, forces: bool = False) -> View:
         """The motion to look at: a page that plays, turns and zooms, with the curves below.
 
         path      where to write it, one HTML file that needs no network; in a notebook the result shows itself
         compare   another motion, which is shown next to this one at the same times
-        forces    with the forces in the joints, and the forces and torques of loads where they act, as arrows; their code is
-                  compiled when it is first used
+        forces    with the forces in the joints, the forces and torques of loads where they act, and weights as arrows; their
+                  code is compiled when it is first used
         Raises ArgumentError for a module that gives no frames of bodies, for positions that are not finite, and for another
         ending than .html; MissingExtra without matplotlib.
 
