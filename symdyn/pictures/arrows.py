@@ -17,8 +17,9 @@ POINTS, LOADS, WEIGHTS, REACTIONS = "contact_points", "applied_loads", "weights"
 LENGTH, LONGEST = 0.22, 2.0
 # Length of the arrow of the largest of all other forces, and of all torques, of the mechanism's length.
 LARGEST = 0.35
-# Length of the head of an arrow, of the arrow, and half its width; the second head of a torque is this far behind, of the arrow.
-HEAD, WIDTH, BEHIND = 0.25, 0.11, 0.16
+# Length of the head of a short arrow, of the arrow, and half its width; the second head of a torque is this far behind. Heads of
+# longer arrows have one size: this length, of the mechanism's.
+HEAD, WIDTH, BEHIND, FULL = 0.25, 0.11, 0.16, 0.05
 # A torque about what a plane picture is seen along: an arc of so many corners around so much of a circle, whose radius is this
 # share of the arrow's length.
 _CORNERS, _AROUND, _RADIUS = 25, 1.5 * np.pi, 0.5
@@ -35,7 +36,7 @@ class Arrows:
     layer    a key of TITLES
     names    of each of n arrows
     tails    where each acts (n_t, n, 3), and vectors (n_t, n, 3), N or N m, n-frame; NaN while nothing does
-    scale    length of an arrow by its newtons or newton metres, m; longest: of any arrow, m
+    scale    length of an arrow by its newtons or newton metres, m; longest: of any arrow, m; head: length of a head at most, m
     points   indices of the mechanism's points that the tails are, or () for others
     """
 
@@ -45,6 +46,7 @@ class Arrows:
     vectors: np.ndarray
     scale: float
     longest: float = np.inf
+    head: float = np.inf
     points: Sequence[int] = ()
 
     @property
@@ -91,7 +93,7 @@ def arrows_of(solution: Solution, length: float, forces: bool = False) -> list[A
                   for kind in (_joints, _loads, _weights) for one in kind(solution)]
         common = max([one.largest for one in others if not one.turns], default=0.0)
         found += [replace(one, scale=LARGEST * length / (one.largest if one.turns else common)) for one in others if one.names]
-    return found
+    return [replace(one, head=FULL * length) for one in found]
 
 
 def _contacts(solution: Solution, length: float) -> Iterator[Arrows]:
@@ -168,8 +170,11 @@ def floor_of(at: np.ndarray, up: np.ndarray, near: float) -> float | None:
     return float(np.median(heights)) if len(heights) and np.ptp(heights) <= near else None
 
 
-def straight(tails: np.ndarray, ways: np.ndarray, heads: int = 1) -> np.ndarray:
-    """Arrows as one curve (m, 2 or 3), lifted between them; from tails (n, 2 or 3) by ways; a torque has two heads."""
+def straight(tails: np.ndarray, ways: np.ndarray, heads: int = 1, longest: float = np.inf) -> np.ndarray:
+    """Arrows as one curve (m, 2 or 3), lifted between them; from tails (n, 2 or 3) by ways; a torque has two heads.
+
+    longest   length of a head at most, m
+    """
     n, tips = tails.shape[-1], tails + ways
     length = np.linalg.norm(ways, axis=1, keepdims=True)
     if n == 2:
@@ -178,23 +183,25 @@ def straight(tails: np.ndarray, ways: np.ndarray, heads: int = 1) -> np.ndarray:
         first = np.cross(ways, np.where(np.abs(ways[:, 2:]) > 0.9 * length, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]))
         first *= length / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
         sides = [first, np.cross(ways, first) / np.maximum(length, 1e-300)]
+    part = np.minimum(1.0, longest / np.maximum(HEAD * length, 1e-300))
     drawn = [tails]
     for k in range(heads):
-        end = tips - k * BEHIND * ways
-        drawn += [end, *[p for side in sides for sign in (1, -1) for p in (end - HEAD * ways + sign * WIDTH * side, end)]]
+        end = tips - k * BEHIND * part * ways
+        drawn += [end, *[p for side in sides for sign in (1, -1)
+                         for p in (end + part * (sign * WIDTH * side - HEAD * ways), end)]]
     return np.stack([*drawn, np.full_like(tails, np.nan)], axis=1).reshape(-1, n)
 
 
-def arcs(centres: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def arcs(centres: np.ndarray, turns: np.ndarray, longest: float = np.inf) -> np.ndarray:
     """Arrows around points (n, 2) of a plane as one curve (m, 2), lifted between them; turns (n,): lengths of arrows, m, positive
-    from the first axis to the second."""
+    from the first axis to the second; longest: length of a head at most, m."""
     angles = np.linspace(-0.25 * np.pi, _AROUND - 0.25 * np.pi, _CORNERS)
     radius, sense = _RADIUS * np.abs(turns)[:, None], np.sign(turns)[:, None]
     around = sense * angles
     circle = radius[..., None] * np.stack([np.cos(around), np.sin(around)], axis=-1)
     end, along = circle[:, -1], sense * np.stack([-np.sin(around[:, -1]), np.cos(around[:, -1])], axis=-1)
     outward = np.divide(end, radius, out=np.zeros_like(end), where=radius > 0)
-    barbs = [end - radius * (HEAD * 2 * along - sign * WIDTH * 3 * outward) for sign in (1, -1)]
+    head = np.minimum(HEAD * np.abs(turns)[:, None], longest)
+    barbs = [end - head * (along - sign * WIDTH / HEAD * outward) for sign in (1, -1)]
     points = np.stack([*np.moveaxis(circle, 1, 0), barbs[0], end, barbs[1], np.full_like(end, np.nan)], axis=1)
     return np.asarray((centres[:, None] + points).reshape(-1, 2))
-

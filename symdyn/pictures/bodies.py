@@ -29,6 +29,8 @@ ZOOM = 0.79
 _THICK = 0.015
 # Of the legend of arrows: width of an entry and height of a line, inches.
 _ENTRY, _LINE = 2.0, 0.16
+# Width of a letter of the axes' numbers, points.
+_LETTER = 3.5
 # What is drawn over all shapes.
 ABOVE = 1e6
 
@@ -92,6 +94,9 @@ def _fill(axes: Any, limits: np.ndarray) -> None:
             axis.set_label_text("")
         else:
             axis.set_major_locator(MaxNLocator(max(3, round(5 * length / max(lengths))), steps=[1, 2, 2.5, 5, 10]))
+    # The numbers of the upright axis stand between it and its label.
+    longest = max((len(text) for text in axes.zaxis.get_major_formatter().format_ticks(axes.get_zticks())), default=0)
+    axes.zaxis.labelpad = 8 + _LETTER * max(longest - 3, 0)
 
 
 def height_of(axes: Any) -> tuple[float, float]:
@@ -100,6 +105,15 @@ def height_of(axes: Any) -> tuple[float, float]:
     heights = flat(axes, np.array([[x, y, z] for x in limits[0] for y in limits[1] for z in limits[2]]))[:, 1]
     view = axes.viewLim
     return float((heights.min() - view.y0) / view.height), float((heights.max() - view.y0) / view.height)
+
+
+def height_with_labels(axes: Any) -> tuple[float, float]:
+    """The same with the numbers and labels of the axes."""
+    low, high = height_of(axes)
+    box = axes.get_window_extent()
+    around = [axis.get_tightbbox(axes.figure.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    labels = np.array([[(one.y0 - box.y0) / box.height, (one.y1 - box.y0) / box.height] for one in around if one is not None])
+    return min(low, *labels[:, 0]), max(high, *labels[:, 1])
 
 
 def title(axes: Any, text: str, size: float) -> None:

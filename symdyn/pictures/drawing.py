@@ -51,8 +51,8 @@ class Drawn:
     def curve(self, index: int) -> np.ndarray:
         """At one of the times, (m, 2 or 3), lifted between the arrows."""
         if self.turns is not None:
-            return arcs(self.tails[index], self.turns[index])
-        return straight(self.tails[index], self.ways[index], 2 if self.arrows.turns else 1)
+            return arcs(self.tails[index], self.turns[index], self.arrows.head)
+        return straight(self.tails[index], self.ways[index], 2 if self.arrows.turns else 1, self.arrows.head)
 
     def reach(self) -> np.ndarray:
         """Where arrows begin and end, (n, 2 or 3)."""

@@ -26,6 +26,8 @@ _SAME, _EXTENT = 1e-6, 0.02
 _LINE = 0.4
 # Radius of a link, of the mechanism's length.
 _RADIUS = 0.02
+# Length of a mechanism whose bodies have no extent, of how far they get.
+_WAY = 0.15
 # Half the length of a rail on which nothing has moved, of the mechanism's length.
 _RAIL = 0.5
 
@@ -63,6 +65,7 @@ class Mechanism:
     travels       how far joints slide along their axes in a motion: least and most, m; () where it is not known
     corners       points that contacts have on bodies: body, (3,) in its axes; wheels: radii of bodies that touch with a rim, m
     ropes         lengths of ropes, m, by the names of their connections
+    way           how far the mechanism gets in a motion, m; 0 where it is not known
     """
 
     bodies: Sequence[str]
@@ -82,6 +85,7 @@ class Mechanism:
     corners: Sequence[tuple[int, np.ndarray]] = ()
     wheels: Mapping[int, float] = field(default_factory=dict)
     ropes: Mapping[str, float] = field(default_factory=dict)
+    way: float = 0.0
 
     @property
     def points(self) -> np.ndarray:
@@ -151,6 +155,17 @@ class Mechanism:
         return m, np.where(np.abs(about) > 1e-12 * max(c @ c, 1e-300), about, 0.0)
 
 
+def drawn_otherwise(about: Any, joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> frozenset[int]:
+    """Indices of bodies that rules draw nothing for: those with shapes of the user's, those that bend, massless carriers. A line
+    that goes on to another body is no shape of its first.
+
+    about   has bodies, drawn and flexible; joints with the two bodies of each
+    """
+    names = [record["body"] for record in about.drawn if record.get("to") is None]
+    names += [record[end] for record in about.flexible for end in ("body", "tip")]
+    return frozenset({k for k, name in enumerate(about.bodies) if name in names} | carriers(about.bodies, joints, joined))
+
+
 def carriers(bodies: Sequence[str], joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> set[int]:
     """Indices of the massless bodies that joints in loops have been given; joined: the two bodies of each joint."""
     made = {f"{name}_carrier" for name in joints} - {name for pair in joined for name in pair}
@@ -201,13 +216,16 @@ def looks_of(m: Mechanism) -> tuple[list[Item], float]:
 
 
 def _length(m: Mechanism) -> float:
-    """How far points of the mechanism are apart, at most; of a single body its size, from its inertia."""
-    spans = [float(np.linalg.norm(np.ptp(m.near_points, axis=0)))]
+    """How far points of the mechanism are apart, at most; of a single body its size, from its inertia. Bodies without any extent
+    are seen on their way."""
+    apart = float(np.linalg.norm(np.ptp(m.near_points, axis=0)))
+    extents = [0.0]
     for body in range(len(m.bodies)):
         own = [m.local(body, point) for point, owner in zip(m.points, m.owners(), strict=True) if owner == body]
-        spans.append(float(np.linalg.norm(np.ptp(own, axis=0))) * (1.0 if len(m.bodies) == 1 else 1.5))
-        spans.append(2.5 * float(np.sqrt(max(np.trace(m.moments(body)[1]), 0.0))))
-    found = max(spans)
+        extents.append(float(np.linalg.norm(np.ptp(own, axis=0))) * (1.0 if len(m.bodies) == 1 else 1.5))
+        extents.append(2.5 * float(np.sqrt(max(np.trace(m.moments(body)[1]), 0.0))))
+    extent = max(extents)
+    found = max(apart, extent, _WAY * m.way if extent <= _SAME * m.way else 0.0)
     return found if np.isfinite(found) and found > 0 else 1.0
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.pictures.arrows import POINTS
-from symdyn.pictures.looks import GROUND, Mechanism, Ref, carriers, point_of, ropes_of
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, drawn_otherwise, point_of, ropes_of
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
@@ -80,9 +80,7 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
     springs = at("spring_points", 6)
     names = list(zip(about.reactions, about.reaction_bodies, about.reaction_kinds, strict=True)) if len(points) else []
     inertia = at("inertial_parameters", 10)
-    drawn = {about.bodies.index(r["body"]) for r in about.drawn if r.get("body") in about.bodies}
-    drawn |= {about.bodies.index(r[end]) for r in about.flexible for end in ("body", "tip") if r[end] in about.bodies}
-    drawn |= carriers(about.bodies, about.reactions, about.reaction_bodies)
+    drawn = drawn_otherwise(about, about.reactions, about.reaction_bodies)
     start = frames[first]
     tips = []
     for output, point in points_of(solution).items():
@@ -93,11 +91,12 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
     centres = at("positions", 3) if "positions" in module.functions else start[:, :3]
     found = Mechanism(about.bodies, start, centres, [(n, *ends, kind) for n, ends, kind in names], points,
                       at("joint_axes", 3) if len(points) else at("", 3), about.connections if len(springs) else (), springs,
-                      inertia if len(inertia) == len(start) else None, about.planar, about.down, frozenset(drawn), tips)
+                      inertia if len(inertia) == len(start) else None, about.planar, about.down, drawn, tips)
     corners, wheels = _touching(solution, found, frames)
     gaps = at("contact_gaps", 1).ravel()[:4 * len(about.contacts):4].tolist()
     ropes = ropes_of([c.name for c in about.contacts], found.connections, gaps, springs) if len(gaps) else {}
-    return replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels)
+    way = float(np.linalg.norm(np.ptp(frames[..., :3], axis=(0, 1))))
+    return replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels, way=way)
 
 
 def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
-from symdyn.pictures.bodies import explain, height_of, make_artists, make_axes, show, title
+from symdyn.pictures.bodies import explain, height_with_labels, make_artists, make_axes, show, title
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
 from symdyn.real_numbers import real_of
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _COLUMNS = 4
 _SIDE = 4.2
-# Room for labels below and for titles above axes of space, in parts of their height.
-_BELOW, _ABOVE = 0.14, 0.13
+# Room below labels, and for titles above axes of space, in parts of their height.
+_MARGIN, _ABOVE = 0.015, 0.1
 
 
 def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None, forces: bool = False) -> Figure:
@@ -58,10 +58,14 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
     return figure
 
 
-def _close_up(figure: Figure, rows: int, columns: int) -> None:
+def _close_up(figure: Any, rows: int, columns: int) -> None:
     """Axes of space are square; leave out of the figure what is blank above and below all of them."""
-    ends = np.array([height_of(axes) for axes in figure.axes])
-    low, high = ends[:, 0].min() - _BELOW, ends[:, 1].max() + _ABOVE
+    for k, axes in enumerate(figure.axes):
+        row, column = divmod(k, columns)
+        axes.set_position((column / columns, (rows - 1 - row) / rows, 1 / columns, 1 / rows))
+        axes.patch.set_visible(False)
+    ends = np.array([height_with_labels(axes) for axes in figure.axes])
+    low, high = ends[:, 0].min() - _MARGIN, ends[:, 1].max() + _ABOVE
     figure.set_size_inches(_SIDE * columns, _SIDE * (high - low) * rows)
     for k, axes in enumerate(figure.axes):
         row, column = divmod(k, columns)

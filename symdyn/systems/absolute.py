@@ -6,6 +6,7 @@ import math
 
 import sympy as sp
 
+from symdyn.model import shapes
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Custom, Planar
 from symdyn.model.symbols import coordinates, parameters, time
@@ -27,6 +28,7 @@ def pendulum_absolute() -> System:
     system = System("pendulum_absolute", gravity=[0, -g])
     _particle(system, "bob", m, x, y)
     system.add_constraint(x**2 + y**2 - length**2, name="rod")
+    system.draw(system.ground, shapes.Line([(0, 0)], 2.5, to=("bob", (0, 0))), color="0.45")
     system.defaults = {m: 1.0, length: 1.0, g: 9.81}
     system.initial = {x: -1.0, y: 0.0}
     system.units = {length: "m"}
@@ -49,6 +51,7 @@ def vehicle_on_track_absolute() -> System:
     system = System("vehicle_on_track_absolute", gravity=[0, -g])
     _particle(system, "vehicle", m, x, y)
     system.add_constraint(x * sp.tan(theta) + y, name="track")
+    system.draw(system.ground, shapes.Line([(-1, sp.tan(theta)), (9, -9 * sp.tan(theta))], 2.0), color="0.45")
     system.defaults = {m: 1.0, g: 9.81, theta: 0.5}
     system.initial = {x.dot: 0.5 * math.cos(0.5), y.dot: -0.5 * math.sin(0.5)}
     system.duration = 2.0
@@ -79,6 +82,7 @@ def vehicle_on_rotating_track_absolute() -> System:
     system.add_constraint(x_t - x_const, name="hinge x")
     system.add_constraint(y_t - y_const, name="hinge y")
     system.add_constraint(y_const - y_v - (x_const - x_v) * sp.tan(theta), name="track")
+    system.draw(track, shapes.Line([(-2.5, 0), (2.5, 0)], 3.0))
     system.defaults = {g: 9.81, m_v: 1.0, m_t: 2.0, I_t: 0.5, x_const: 0.0, y_const: 0.0}
     c, s, rate = math.cos(0.3), math.sin(0.3), 0.5
     system.initial = {x_v: -c, y_v: -s, theta: 0.3, x_v.dot: s * rate, y_v.dot: -c * rate, theta.dot: rate}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from symdyn.model import shapes
 from symdyn.model.joints import Custom, Planar
 from symdyn.model.symbols import coordinates, parameters, time
 from symdyn.model.system import System
@@ -39,6 +40,7 @@ def car_axis() -> System:
     system.add_spring_damper(wheel, right, stiffness=1, length=L0, name="right spring")
     system.add_constraint(xl * xb + yl * yb, name="strut")
     system.add_constraint((xl - xr)**2 + (yl - yr)**2 - L**2, name="axis")
+    system.draw(left, shapes.Line([(0, 0)], 4.0, to=(right, (0, 0))), color="0.45")
     system.defaults = {M: 10.0, eps: 1e-2, L: 1.0, L0: 0.5, r: 0.1, w: 10.0, g: 1.0}
     system.initial = {yl: 0.5, xr: 1.0, yr: 0.5, xl.dot: -0.5, xr.dot: -0.5}
     system.duration = 3.0

@@ -7,6 +7,7 @@ import math
 import sympy as sp
 
 from symdyn.errors import ModelError
+from symdyn.model import shapes
 from symdyn.model.joints import Revolute
 from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, parameters
@@ -72,6 +73,7 @@ def slider_crank() -> System:
     system.add_constraint(length * sp.sin(theta) + length * sp.sin(theta + phi), name="slider")
     for name, rod in zip(("P2", "P3"), rods, strict=True):
         system.add_output(name, position(rod, (length, 0, 0)))
+    system.draw(system.ground, shapes.Line([(-2.2 * length, 0), (2.2 * length, 0)], 1.0), color="0.6")
     system.defaults = {g: 9.81, m: 1.0, length: 1.0}
     rate = 2 * math.sqrt(2.0)
     system.initial = {theta: math.pi / 4, phi: -math.pi / 2, theta.dot: rate, phi.dot: -2 * rate}

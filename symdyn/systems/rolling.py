@@ -64,6 +64,8 @@ def skate() -> System:
     body = system.add_body("skate", mass=m, inertia=I, com=[a, 0])
     system.add_joint(Planar("plane", system.ground, body, [x, y, theta]))
     system.add_constraint(-x.dot * sp.sin(theta) + y.dot * sp.cos(theta), name="edge")
+    system.draw(body, shapes.Box([4 * a, 1.5 * a, a], center=[a, 0, 0]), color="#8fb3d9")
+    system.draw(body, shapes.Line([[-a, 0, 0], [3 * a, 0, 0]], 3.0), color="#24425f")
     system.defaults = {m: 1.0, I: 0.02, a: 0.1}
     system.initial = {x.dot: -0.5, theta.dot: 4.0}
     system.duration = 5.0

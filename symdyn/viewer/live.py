@@ -16,7 +16,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
-from symdyn.pictures.looks import Mechanism, carriers, ropes_of
+from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of
 from symdyn.pictures.mechanism import touched
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of
@@ -102,9 +102,7 @@ def _evaluate(equations: Equations, names: Sequence[str], values: dict[str, floa
 def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dict[str, float]) -> Mechanism:
     n_b = len(equations.bodies)
     nothing = np.zeros((0, 6))
-    drawn = {equations.bodies.index(r["body"]) for r in equations.drawn if r.get("body") in equations.bodies}
-    drawn |= {equations.bodies.index(r[end]) for r in equations.flexible for end in ("body", "tip") if r[end] in equations.bodies}
-    drawn |= carriers(equations.bodies, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
+    drawn = drawn_otherwise(equations, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
     inertia = numbers.get("inertial_parameters")
     springs = numbers.get("spring_points", nothing).reshape(-1, 6)
     gaps = numbers.get("contact_gaps", nothing).ravel()[:4 * len(equations.contacts):4].tolist()
@@ -113,7 +111,7 @@ def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dic
                      equations.joints, numbers.get("joint_points", nothing).reshape(-1, 6),
                      numbers.get("joint_axes", nothing).reshape(-1, 3), equations.connections,
                      springs, None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
-                     frozenset(drawn), ropes=ropes)
+                     drawn, ropes=ropes)
     corners, wheels = _touching(equations, found, values)
     return replace(found, corners=corners, wheels=wheels)
 

@@ -72,6 +72,15 @@ def test_a_wheel_is_a_disc_about_its_axle() -> None:
     assert {"block", "pin", "rod"} <= {item.kind for item in items}
 
 
+def test_a_line_to_another_body_leaves_its_first_as_it_looks() -> None:
+    system = sd.systems.pendulum()
+    before, _, _ = looks(system)
+    system.draw("bob", sd.shapes.Line([[0, -0.5]], to=(system.ground, [1, 0])))
+    assert looks(system)[0] == before
+    system.draw("bob", sd.shapes.Line([[0, 0], [0, -1]]))
+    assert not [item for item in looks(system)[0] if item.name == "bob"]
+
+
 def test_springs_and_dampers() -> None:
     y = sd.coordinates("y")
     system = sd.System("oscillator", gravity=[0, -9.81])
