@@ -23,12 +23,15 @@ void main() {
     shown = vec4(color.rgb * (flat_ > 1.5 ? 1.0 : 0.42 + 0.62 * d), color.a);
 }`;
 
+// Chromium names the graphics card by an extension alone, which Firefox warns of.
 function softwareOnly() {
-    const gl = document.createElement("canvas").getContext("webgl2");
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [1, 1];
+    const gl = canvas.getContext("webgl2");
     if (!gl) return true;
-    const about = gl.getExtension("WEBGL_debug_renderer_info");
-    const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
-    gl.getExtension("WEBGL_lose_context")?.loseContext();
+    let name = gl.getParameter(gl.RENDERER);
+    const about = name === "WebKit WebGL" && gl.getExtension("WEBGL_debug_renderer_info");
+    if (about) name = gl.getParameter(about.UNMASKED_RENDERER_WEBGL);
     return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 
