@@ -31,7 +31,11 @@ function slider(parent, { name, unit, least, most, value, step }, change) {
     input.dataset.name = name;
     [input.min, input.max, input.step] = [least, most, step || (most - least) / 1000 || 1e-3];
     const digits = Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(most - least || 1))));
-    const show = v => { input.value = v; output.textContent = String(+v.toFixed(digits)); };
+    // quick: without the number, which costs a layout of the page.
+    const show = (v, quick = false) => {
+        input.value = v;
+        if (!quick) output.textContent = String(+v.toFixed(digits));
+    };
     show(value);
     input.addEventListener("input", () => change(Number(input.value), show));
     return { input, show };

@@ -135,7 +135,7 @@ function playControls(parent, below, stage, scenes, say) {
     function seek(time, quick = false) {
         now = time;
         for (const { source } of scenes) source.seek(Math.max(source.t[0], Math.min(source.t[source.t.length - 1], time)));
-        bar.show(time);
+        bar.show(time, quick);
         for (const plot of plots) plot.seek(time, quick);
         stage.invalidate();
     }

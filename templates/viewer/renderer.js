@@ -2,26 +2,34 @@
 // finer, moving ones are not.
 const VERTEX = `#version 300 es
 in vec3 place; in vec3 normal;
-uniform mat4 camera, model; uniform vec3 stretch; uniform float taper;
+in vec4 x, y, z, o; in vec4 stretch; in vec4 color; in float flat_;
+uniform mat4 camera;
 out vec3 direction, world;
+flat out vec4 own; flat out float kind;
 void main() {
+    mat4 model = mat4(x, y, z, o);
     vec3 p = place;
-    p.xy *= mix(1.0, taper, clamp(p.z, 0.0, 1.0));
+    p.xy *= mix(1.0, stretch.w, clamp(p.z, 0.0, 1.0));
     vec4 w = model * vec4(p, 1.0);
     world = w.xyz;
-    direction = mat3(model) * (normal / (stretch * stretch));
+    direction = mat3(model) * (normal / (stretch.xyz * stretch.xyz));
+    own = color;
+    kind = flat_;
     gl_Position = camera * w;
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 direction, world;
-uniform vec4 color; uniform vec3 light; uniform float flat_;
+flat in vec4 own; flat in float kind;
+uniform vec3 light;
 out vec4 shown;
 void main() {
-    vec3 n = flat_ > 0.5 ? normalize(cross(dFdx(world), dFdy(world))) : normalize(direction);
+    vec3 n = kind > 0.5 ? normalize(cross(dFdx(world), dFdy(world))) : normalize(direction);
     float d = 0.5 + 0.5 * dot(n, light);
-    shown = vec4(color.rgb * (flat_ > 1.5 ? 1.0 : 0.42 + 0.62 * d), color.a);
+    shown = vec4(own.rgb * (kind > 1.5 ? 1.0 : 0.42 + 0.62 * d), own.a);
 }`;
+// Numbers of an instance of a mesh, and its attributes with their sizes: the columns of its matrix, stretches with the taper, ...
+const INSTANCE = [["x", 4], ["y", 4], ["z", 4], ["o", 4], ["stretch", 4], ["color", 4], ["flat_", 1]], NUMBERS = 25;
 
 // Chromium names the graphics card by an extension alone, which Firefox warns of.
 function softwareOnly() {
@@ -48,13 +56,13 @@ class Renderer {
             gl.compileShader(shader);
             gl.attachShader(program, shader);
         }
-        gl.bindAttribLocation(program, 0, "place");
-        gl.bindAttribLocation(program, 1, "normal");
+        ["place", "normal", ...INSTANCE.map(([name]) => name)].forEach((name, k) => gl.bindAttribLocation(program, k, name));
         gl.linkProgram(program);
         if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
         gl.useProgram(program);
-        this.at = Object.fromEntries(["camera", "model", "stretch", "taper", "color", "light", "flat_"].map(
+        this.at = Object.fromEntries(["camera", "light"].map(
             name => [name, gl.getUniformLocation(program, name)]));
+        this.waiting = new Set();
         gl.enable(gl.DEPTH_TEST);
         gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     }
@@ -69,12 +77,22 @@ class Renderer {
             gl.enableVertexAttribArray(k);
             gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 24, 12 * k);
         }
+        const own = gl.createBuffer();
+        gl.bindBuffer(gl.ARRAY_BUFFER, own);
+        let first = 0;
+        INSTANCE.forEach(([, count], k) => {
+            gl.enableVertexAttribArray(2 + k);
+            gl.vertexAttribPointer(2 + k, count, gl.FLOAT, false, 4 * NUMBERS, 4 * first);
+            gl.vertexAttribDivisor(2 + k, 1);
+            first += count;
+        });
         if (triangles) {
             gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
             gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
         }
         gl.bindVertexArray(null);
-        return { array, buffer, count: triangles ? triangles.length : vertices.length / 6, lines: !triangles };
+        return { array, buffer, count: triangles ? triangles.length : vertices.length / 6, lines: !triangles, own, instances: 0,
+            numbers: new Float32Array(8 * NUMBERS) };
     }
 
     change(mesh, vertices) {
@@ -98,26 +116,49 @@ class Renderer {
     // Part `which` of `many` beside each other.
     part(which, many, camera, light) {
         const gl = this.gl, width = this.canvas.width / many;
+        this.flush();
         gl.viewport(which * width, 0, width, this.canvas.height);
         gl.uniformMatrix4fv(this.at.camera, false, camera);
         gl.uniform3fv(this.at.light, light);
     }
 
     // Whether what follows is drawn over all that is there.
-    over(on) { on ? this.gl.disable(this.gl.DEPTH_TEST) : this.gl.enable(this.gl.DEPTH_TEST); }
+    over(on) {
+        this.flush();
+        on ? this.gl.disable(this.gl.DEPTH_TEST) : this.gl.enable(this.gl.DEPTH_TEST);
+    }
 
-    // flat: 0 by normals, 1 by faces, 2 without light.
+    // flat: 0 by normals, 1 by faces, 2 without light. What is opaque waits: equal meshes are drawn at once.
     draw(mesh, model, stretch, color, taper = 1, flat = 0, alpha = 1) {
-        const gl = this.gl, at = this.at;
-        gl.uniformMatrix4fv(at.model, false, model);
-        gl.uniform3fv(at.stretch, stretch);
-        gl.uniform1f(at.taper, taper);
-        gl.uniform1f(at.flat_, flat);
-        gl.uniform4f(at.color, color[0], color[1], color[2], alpha);
-        if (alpha < 1) gl.enable(gl.BLEND);
-        gl.bindVertexArray(mesh.array);
-        if (mesh.lines) gl.drawArrays(mesh.strip ? gl.LINE_STRIP : gl.LINES, 0, mesh.count);
-        else gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_SHORT, 0);
-        if (alpha < 1) gl.disable(gl.BLEND);
+        if (alpha < 1) this.flush();
+        if (NUMBERS * (mesh.instances + 1) > mesh.numbers.length) {
+            const more = new Float32Array(2 * mesh.numbers.length);
+            more.set(mesh.numbers);
+            mesh.numbers = more;
+        }
+        const n = mesh.numbers, k = NUMBERS * mesh.instances++;
+        n.set(model, k);
+        [n[k + 16], n[k + 17], n[k + 18], n[k + 19], n[k + 20], n[k + 21], n[k + 22], n[k + 23], n[k + 24]] = [
+            stretch[0], stretch[1], stretch[2], taper, color[0], color[1], color[2], alpha, flat];
+        this.waiting.add(mesh);
+        if (alpha < 1) {
+            this.gl.enable(this.gl.BLEND);
+            this.flush();
+            this.gl.disable(this.gl.BLEND);
+        }
+    }
+
+    // Draw what waits. Each draw has a cost of its own where there is no graphics card.
+    flush() {
+        const gl = this.gl;
+        for (const mesh of this.waiting) {
+            gl.bindVertexArray(mesh.array);
+            gl.bindBuffer(gl.ARRAY_BUFFER, mesh.own);
+            gl.bufferData(gl.ARRAY_BUFFER, mesh.numbers.subarray(0, NUMBERS * mesh.instances), gl.STREAM_DRAW);
+            if (mesh.lines) gl.drawArraysInstanced(mesh.strip ? gl.LINE_STRIP : gl.LINES, 0, mesh.count, mesh.instances);
+            else gl.drawElementsInstanced(gl.TRIANGLES, mesh.count, gl.UNSIGNED_SHORT, 0, mesh.instances);
+            mesh.instances = 0;
+        }
+        this.waiting.clear();
     }
 }

@@ -139,6 +139,7 @@ class Stage {
             this.renderer.part(k, many, this.lens.all, light);
             this.drawScene(scene, dark);
         });
+        this.renderer.flush();
         this.frames++;
         this.after();
     }
@@ -286,16 +287,16 @@ class Stage {
     // What of one kind acts now, to its scale.
     drawArrows(scene, { layer, names, points, scale, longest, color, unit, now }) {
         const { source } = scene, wide = points.length ? 3 : 6;
+        // Nothing hides a force.
+        this.renderer.over(true);
         names.forEach((name, k) => {
             const at = points.length ? source.at(points[k]) : now.slice(wide * k, wide * k + 3), f = now.slice(wide * k + wide - 3, wide * k + wide);
             const n = size(f), long = this.forceScale * Math.min(n * scale, longest ?? Infinity);
             if (!(long >= 0.01 * this.length)) return;
-            // Nothing hides a force.
-            this.renderer.over(true);
             const draw = layer !== "torques" ? this.arrow : this.planar ? this.arc : this.twoHeads;
             draw.call(this, scene, at, times(f, long / n), color, `${name}: ${n.toPrecision(4)} ${unit}`);
-            this.renderer.over(false);
         });
+        this.renderer.over(false);
     }
 
     arrow(scene, a, way, color, name, heads = 1) {
