@@ -129,6 +129,8 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
     "flexible": Measurement(
         "symdyn.lab.flexible:run", "flexible bodies: published frequencies and motions, energy, limits", (_ONLY,)),
+    "pages": Measurement(
+        "symdyn.lab.pages:run", "pages that play, without a graphics card: pictures a second, processor time of each", (_ONLY,)),
     "costs": Measurement(
         "symdyn.lab.cost_model:run", "the constants by which the fastest formulation is predicted, from 40 systems", (_BEST,)),
     "references": Measurement(

@@ -1,6 +1,7 @@
 // Puts the page together.
-// Milliseconds between numbers next to the curves while a motion plays.
-const BETWEEN_NUMBERS = 120;
+// Milliseconds between numbers next to the curves while a motion plays, and between places of cursors and bar: the picture alone
+// moves at every frame.
+const BETWEEN_NUMBERS = 120, BETWEEN_CURSORS = 30;
 function start() {
     const page = JSON.parse(document.getElementById("data").textContent);
     const find = id => document.getElementById(id);
@@ -116,7 +117,7 @@ function liveControls(parent, stage, scene, say) {
 
 function playControls(parent, below, stage, scenes, say) {
     const first = Math.min(...scenes.map(s => s.source.t[0])), last = Math.max(...scenes.map(s => s.source.t[s.source.t.length - 1]));
-    let now = first, playing = false, speed = 1, before = 0, written = 0, loop = true;
+    let now = first, playing = false, speed = 1, before = 0, written = 0, moved = 0, loop = true;
     const plots = [];
     scenes.forEach((scene, k) => {
         const box = element(below, "section");
@@ -132,11 +133,14 @@ function playControls(parent, below, stage, scenes, say) {
     const rate = choice(parent, "speed ", rates.map(v => [v, `${v} ×`]), v => { speed = v; });
     rate.value = "1";
     check(parent, "repeat", loop, on => { loop = on; });
-    function seek(time, quick = false) {
+    function seek(time) {
+        place(time);
+        bar.show(time);
+        for (const plot of plots) plot.seek(time);
+    }
+    function place(time) {
         now = time;
         for (const { source } of scenes) source.seek(Math.max(source.t[0], Math.min(source.t[source.t.length - 1], time)));
-        bar.show(time, quick);
-        for (const plot of plots) plot.seek(time, quick);
         stage.invalidate();
     }
     function pause() {
@@ -163,7 +167,12 @@ function playControls(parent, below, stage, scenes, say) {
                 time = loop ? first + (time - last) % (last - first || 1) : last;
             }
             const quick = playing && clock - written < BETWEEN_NUMBERS;
-            seek(time, quick);
+            place(time);
+            if (!quick || clock - moved >= BETWEEN_CURSORS) {
+                bar.show(time, quick);
+                for (const plot of plots) plot.seek(time, quick);
+                moved = clock;
+            }
             if (!quick) written = clock;
         }
         before = clock;
