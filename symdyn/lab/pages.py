@@ -1,4 +1,4 @@
-"""`symdyn bench pages`: what a picture of a page that plays costs on a processor without a graphics card, in headless Chromium."""
+"""`symdyn bench pages`: what a picture of a page that plays costs without a graphics card, in headless Chromium."""
 
 from __future__ import annotations
 
@@ -109,11 +109,12 @@ def _page(name: str, html: str, bound: float) -> Iterator[Figure]:
         yield f"{name}: all JavaScript, a picture", 1000 * script / frames, "ms", ""
     for kind, what in (("renderer", "process of the page"), ("gpu-process", "drawing and putting the page together")):
         yield f"{name}: {what}, a picture", 1000 * by_process.get(kind, 0.0) / frames, "ms", ""
-    yield f"{name}: all processes, a picture", 1000 * sum(by_process.values()) / frames, "ms", f"< {bound:g}" if bound else ""
+    whole = 1000 * sum(by_process.values()) / frames
+    yield f"{name}: all processes, a picture", whole, "ms", f"< {bound:g}" if bound else ""
 
 
 def _state(page: Any, inside: Any) -> tuple[int, float, float, dict[str, float]]:
-    """Pictures so far, ms of the page's drawing, s of all its scripts, and processor time of the browser's processes by kind, s."""
+    """Pictures so far, ms of the page's drawing, s of its scripts, and processor time of processes of the browser by kind, s."""
     frames, spent = page.evaluate("[symdyn.stage.frames, symdyn.stage.spent]")
     metrics = {one["name"]: one["value"] for one in inside.send("Performance.getMetrics")["metrics"]}
     return int(frames), float(spent), float(metrics["ScriptDuration"]), _processes()

@@ -67,7 +67,8 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
             axis._axinfo["grid"].update(color="0.88", linewidth=0.7)
     else:
         axes.set_aspect("equal")
-        axes.locator_params(axis="x", nbins=6)
+        spans = np.ptp(limits, axis=1)
+        axes.locator_params(axis="x", nbins=int(np.clip(7 * spans[0] / spans[1], 2, 6)))
         axes.grid(True, color="0.92", linewidth=0.7)
         axes.set_axisbelow(True)
         if drawing.ground is not None and below in drawing.axes:

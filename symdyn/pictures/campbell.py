@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from symdyn.pictures.figure import Picture
 from symdyn.pictures.style import MANY, colors_of
+from symdyn.pictures.symbols import axis_label
 
 if TYPE_CHECKING:
     from symdyn.statics.campbell import Campbell
@@ -59,7 +60,7 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
     upper.set_ylabel(f"damped frequency, {diagram.frame} frame [Hz]")
     lower.set_ylabel("damping [%]")
     lower.axhline(0.0, color="0.3", linewidth=0.8)
-    lower.set_xlabel(f"{diagram.speed} [rad/s]")
+    lower.set_xlabel(axis_label([diagram.speed], "", "rad/s"))
     for axes in (upper, lower):
         axes.grid(alpha=0.3)
     upper.secondary_xaxis("top", functions=(lambda w: w * RPM, lambda n: n / RPM)).set_xlabel("[rpm]", fontsize=8)

@@ -195,13 +195,24 @@ function names(layer, stage) {
         ...data.bodies.map((name, k) => ({ name, which, source, ref: 2 * data.joints.length + k, kind: "body" })),
         ...data.joints.map(([name], k) => ({ name, which, source, ref: 2 * k + 1, kind: "joint" }))]);
     for (const entry of entries) entry.label = element(layer, "span", entry.kind, entry.name);
+    // Steps by which a name gives way to one that is nearer to the eye, in lines; where there is no room it is left out.
+    const steps = [0, 1, -1, 2, -2, 3];
     stage.after = () => {
         layer.hidden = !stage.layers.names;
         if (layer.hidden) return;
-        for (const { label, source, ref, which } of entries) {
-            const p = stage.project(source.at(ref), which);
-            label.hidden = !p || p[0] < 0 || p[1] < 0 || p[0] > stage.canvas.clientWidth - 10 || p[1] > stage.canvas.clientHeight - 10;
-            if (p) label.style.transform = `translate(${p[0]}px, ${p[1]}px)`;
+        const { clientWidth: wide, clientHeight: high } = stage.canvas, placed = [];
+        for (const entry of entries) {
+            entry.at = stage.project(entry.source.at(entry.ref), entry.which);
+            entry.label.hidden = false;
+            entry.size ||= [entry.label.offsetWidth, entry.label.offsetHeight];
+        }
+        for (const { label, at, size: [w, h] } of [...entries].sort((a, b) => (a.at ? a.at[2] : Infinity) - (b.at ? b.at[2] : Infinity))) {
+            const room = at && at[0] >= 0 && at[0] <= wide - 10 && steps.map(step => at[1] + step * h).find(y => y >= 0 && y <= high - 10
+                && !placed.some(([x, v, n, m]) => at[0] < x + n && x < at[0] + w && y < v + m && v < y + h));
+            label.hidden = !Number.isFinite(room);
+            if (label.hidden) continue;
+            placed.push([at[0], room, w, h]);
+            label.style.transform = `translate(${at[0]}px, ${room}px)`;
         }
     };
 }

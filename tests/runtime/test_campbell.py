@@ -167,7 +167,7 @@ def test_picture(tmp_path: Any) -> None:
     labels = [t.get_text() for t in upper_axes.texts]
     assert labels == ["1P", "3P", "6P"] and len(upper_axes.lines) == len(diagram.names) + 3
     assert len(lower_axes.lines) == len(diagram.names) + 1 == 3
-    assert "phi_dot [rad/s]" in lower_axes.get_xlabel()
+    assert lower_axes.get_xlabel() == r"$\dot{\phi}$ [rad/s]"
     assert len(diagram.plot(highest=1.55).axes[0].lines) == 1 + 3  # the other mode starts at 1.59 Hz and rises
 
 

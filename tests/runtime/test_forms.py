@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,15 @@ def test_numbers_and_labels_of_axes_in_space_are_within_the_picture() -> None:
             numbers = [text.get_window_extent() for text in axes.zaxis.get_ticklabels() if text.get_text()]
             label = axes.zaxis.label.get_window_extent()
             assert not any(label.overlaps(number) for number in numbers)
+
+
+def test_numbers_of_a_narrow_picture_are_apart() -> None:
+    module = sd.systems.n_link_pendulum(3).compile(backend="numpy")
+    figure = module.simulate((0.0, 0.5), q=[-1.6, 0.05, 0.1]).picture()
+    figure.canvas.draw()
+    for axes in figure.axes:
+        numbers = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
+        assert len(numbers) >= 2 and all(a.x1 < b.x0 for a, b in itertools.pairwise(numbers))
 
 
 def test_springs_follow_their_ends() -> None:

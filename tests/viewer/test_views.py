@@ -165,6 +165,17 @@ def test_names_under_the_pointer(chromium: Any, tmp_path: Path) -> None:
         assert found == {"link1", "elbow (revolute)", "shoulder (revolute)"}
 
 
+def test_names_over_the_picture_do_not_cover_each_other(chromium: Any, tmp_path: Path) -> None:
+    sd.systems.puma560().show(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html", 700, 500) as opened:
+        opened.page.get_by_label("names").check()
+        opened.page.evaluate("symdyn.stage.draw(false)")
+        boxes = np.array(opened.page.evaluate("""[...document.querySelectorAll("#names span")].filter(
+            e => e.checkVisibility()).map(e => e.getBoundingClientRect()).map(b => [b.left, b.top, b.right, b.bottom])"""))
+        over = (boxes[:, None, :2] < boxes[None, :, 2:]).all(axis=2) & (boxes[None, :, :2] < boxes[:, None, 2:]).all(axis=2)
+        assert len(boxes) >= 8 and over.sum() == len(boxes)
+
+
 # -- the motion
 
 
