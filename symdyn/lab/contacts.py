@@ -279,9 +279,7 @@ def measure(motion: Motion, repeats: int = 3) -> Iterator[Point]:
         solution = module.simulate(times, *motion.start, method="moreau", step=setting)
         return clock.process_time() - begun, solution.q[:, :n]
 
-    programs: dict[str, tuple[Runner, tuple[float, ...]]] = {LOCATED: (located, TOLERANCES)}
-    if not any(isinstance(c, sd.JointFriction) for c in motion.system().contacts):
-        programs[STEPPED] = (stepped, STEPS)
+    programs: dict[str, tuple[Runner, tuple[float, ...]]] = {LOCATED: (located, TOLERANCES), STEPPED: (stepped, STEPS)}
     programs |= {name: (run, STEPS) for name, run in motion.peers.items() if _installed(name)}
     for name, (run, settings) in programs.items():
         run(motion.times, settings[0])  # which compiles what is not yet

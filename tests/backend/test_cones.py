@@ -18,7 +18,8 @@ TOLERANCE = 1e-13
 class Problem:
     """Contacts with rows J (n_rows, n_u), M = 1, velocities without impulses free (n_rows,)."""
 
-    def __init__(self, J: np.ndarray, free: np.ndarray, friction: list[float], rows: int = 3, dense: int = 200) -> None:
+    def __init__(self, J: np.ndarray, free: np.ndarray, friction: list[float], rows: int = 3, dense: int = 200,
+                 bounded: bool = False) -> None:
         n_rows, n_u = J.shape
         n = n_rows // rows
         self.J, self.free, self.friction, self.rows = J, free, np.array(friction), rows
@@ -32,6 +33,7 @@ class Problem:
         entries = np.ascontiguousarray(J).ravel()
         for name, values in {"along": entries, "answer": entries, "friction": self.friction, "free": free}.items():
             self.memory.take(record, name, values)
+        self.memory.take(record, "bounded", np.full(n, bounded, dtype=np.intc))
         self.P = self.memory.take(record, "P", np.zeros(n_rows))
 
     def solve(self, sweeps: int = 2000) -> float:

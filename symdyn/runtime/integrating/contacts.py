@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.metadata import ContactRecord, ModuleMetadata
-from symdyn.contact_kinds import BODIES, CLUTCH, FRICTION
+from symdyn.contact_kinds import BODIES, CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
@@ -153,11 +153,6 @@ def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
 def not_stepped(records: Sequence[ContactRecord]) -> list[str]:
     """What of contacts method="moreau" does not take, whose steps of one length go across switches: parts of a message."""
     found = []
-    elements = dict.fromkeys(record.contact for record in records if record.kind in (CLUTCH, FRICTION))
-    if elements:
-        found.append("method='moreau' takes what has a gap that closes: contacts of bodies, stops, backlash and ropes, not "
-                     f"clutches or dry friction of joints ({', '.join(elements)}); leave out the method, and switches are "
-                     "located")
     others = {record.contact: record.impact for record in records if record.impact != "newton"}
     if others:
         found.append("method='moreau' has Newton's law of impacts; "

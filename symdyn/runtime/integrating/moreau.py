@@ -12,6 +12,7 @@ import numpy as np
 
 from symdyn.backend.c_records import codes_of
 from symdyn.backend.right_side import RightSide
+from symdyn.contact_kinds import CLUTCH, FRICTION
 from symdyn.errors import ArgumentError
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import require_compiler
@@ -34,6 +35,7 @@ GAPS, DIRECTIONS = "contact_gaps", "contact_directions"
 MODES = (laws.OPEN, laws.STICKING, laws.SLIDING)
 STICKING, SLIDING = 1, 2
 STATUS = SimpleNamespace(**codes_of("runtime/moreau.h"))
+KINDS = {CLUTCH: STATUS.SPEED, FRICTION: STATUS.BOUNDED}
 # Tolerances below this part are out of reach of a method whose impacts are of first order.
 FINEST = 1e-7
 # Steps of the first of the runs whose steps are halved, and at most.
@@ -143,7 +145,6 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
     stepper = Stepper(module, request)
     every = request.times is None
     rows, times, done_at = [request.x0.copy()], [request.span[0]], [0]
-    losses = [stepper.losses.copy()]
     message, interrupted, status, ended = "reached the end", False, 0, ""
     limit = request.max_steps if request.step and request.max_steps is not None else total + 1
     begun = clock.perf_counter()
@@ -160,7 +161,6 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
                     rows += list(part)
                     times += [start + (done + k + 1) * h for k in range(len(part))]
                     done_at += [len(stepper.h) - len(part) + k + 1 for k in range(len(part))]
-                    losses += [stepper.losses.copy()] * len(part)
                 done += len(part)
                 if bar is not None:
                     bar.update(len(part) * h)
@@ -168,7 +168,6 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
                 rows.append(stepper.x.copy())
                 times.append(start + count * h)
                 done_at.append(len(stepper.h))
-                losses.append(stepper.losses.copy())
             if status:
                 break
     except KeyboardInterrupt:
@@ -179,15 +178,28 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
     if request.times is not None:
         times = [request.span[0], *request.times[request.times > request.span[0]][:len(rows) - 1]]
         if request.times[0] > request.span[0]:
-            rows, times, done_at, losses = rows[1:], times[1:], done_at[1:], losses[1:]
+            rows, times, done_at = rows[1:], times[1:], done_at[1:]
     record = stepper.record
-    stepped = Stepped(np.array(stepper.t), np.array(stepper.h), np.array(done_at, dtype=int), stepper.touched(), np.array(losses),
+    touched, done = stepper.touched(), np.array(done_at, dtype=int)
+    stepped = Stepped(np.array(stepper.t), np.array(stepper.h), done, touched, _losses(module, touched, len(stepper.h))[done],
                       record.worst_residual, record.worst_depth)
     doubts = [stepper.doubt()] if status >= 0 else []
     phases, row_phases = _phases(module, request, stepped)
     return Outcome(np.array(times), np.array(rows), not status, message, interrupted, len(stepper.h), 0, record.n_evaluations,
                    clock.perf_counter() - begun, doubts=tuple(filter(None, doubts)), cause=stepper.cause, stepped=stepped,
                    phases=phases, row_phases=row_phases)
+
+
+def _losses(module: Module, touched: Touched, n_steps: int) -> np.ndarray:
+    """Energy that contacts with a name, then groups, have taken until each step began, and in all, J, (n_steps + 1, n)."""
+    n, groups = len(module.metadata.contacts), module.metadata.contact_groups
+    of_body = np.repeat(np.arange(len(groups)), [len(group.bodies) for group in groups])
+    place = touched.a.astype(int)
+    place[touched.b >= 0] = n + of_body[touched.a[touched.b >= 0]]
+    end, impulse, begin = (touched.values[:, k:k + 3] for k in (1, 4, 7))
+    lost = np.zeros((n_steps + 1, n + len(groups)))
+    np.add.at(lost, (touched.step + 1, place), -((begin + end) * impulse).sum(axis=1) / 2)
+    return np.cumsum(lost, axis=0)
 
 
 def modes_of(stepped: Stepped, n: int) -> np.ndarray:
@@ -207,7 +219,9 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
     modes, slips = modes_of(stepped, n), np.zeros((len(stepped.h), n, 2))
     touched = stepped.touched
     named = touched.b < 0
-    slips[touched.step[named], touched.a[named]] = touched.values[named, 2:4]
+    rows = touched.values[named]
+    bounded = np.array([not record.normal for record in records], dtype=bool)[touched.a[named]]
+    slips[touched.step[named], touched.a[named]] = np.where(bounded[:, None], rows[:, 1:3], rows[:, 2:4])
     sizes = np.linalg.norm(slips, axis=2, keepdims=True)
     along = np.where((modes == SLIDING)[:, :, None] & (sizes > 0), slips / np.where(sizes > 0, sizes, 1.0), 0.0)
     phases: list[Phase] = []
@@ -217,7 +231,8 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
         if here != latest:
             p = request.p.copy()
             for record, mode, direction in zip(records, modes[k].tolist(), along[k], strict=True):
-                values = [mode != 0, *([mode == STICKING] if record.sticking else []), *direction[:record.rows - 1]]
+                closed, sticking = [mode != 0] * bool(record.closed), [mode == STICKING] * bool(record.sticking)
+                values = [*closed, *sticking, *direction[:record.tangents]]
                 for name, value in zip(record.parameters, values, strict=True):
                     p[names.index(name)] = value
             if n:
@@ -258,6 +273,8 @@ class Stepper:
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))
+        memory.take(record, "given_kind", np.array([*(KINDS.get(c.kind, STATUS.PLACED) for c in metadata.contacts), 0],
+                                                   dtype=np.intc))
         coordinates = metadata.names("q")
         place = {q: k for k, q in enumerate(coordinates)}
         record.n_units = len(metadata.unit_groups)
@@ -268,7 +285,6 @@ class Stepper:
                    old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
         memory.put(record, float, work=8 * n_x, P_old=3 * most, basis=9 * most, incoming=3 * most, at_end=4 * most)
-        self.losses = memory.take(record, "loss_of", np.zeros(n_given + len(groups)))
         record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
         record.length = request.stabilization.length or 1.0

@@ -82,5 +82,5 @@ def cones(memory: Memory, n_u: int, most: int, most_entries: int, dense: int) ->
     rows = dict.fromkeys(("free", "P", "w", "kept", "step", "before"), 3 * most)
     memory.put(record, float, along=most_entries, answer=most_entries, friction=most, d_n=most, d_t=most, block=9 * most, du=n_u,
                dense=dense * dense, **rows)
-    memory.put(record, np.intc, state=most)
+    memory.put(record, np.intc, state=most, bounded=most)
     return record

@@ -122,14 +122,14 @@ def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactM
         impulses[touched.step[own]] = touched.values[own, 4:4 + record.rows]
         summed = np.vstack([np.zeros(record.rows), np.cumsum(impulses, axis=0)])
         mode, none = modes[:, place], np.zeros((len(solution.t), record.rows))
-        fresh = own[(touched.values[own, 4] > 0) & (np.append(0, mode)[touched.step[own]] == 0)]
+        fresh = own[(touched.values[own, 4] > 0) & (np.append(0, mode)[touched.step[own]] == 0) & record.normal]
         after, of_hits, before_hits = (touched.values[fresh, k:k + record.rows] for k in (1, 4, 7))
         hits = Impacts(stepped.t[touched.step[fresh]], of_hits, before_hits, after)
         changes = [k for k in range(n_steps) if k == 0 or mode[k] != mode[k - 1]]
-        names = np.array([_called(name, record) for name in MODES], dtype=object)
+        names = np.array([_called(name if record.normal or name != OPEN else STICKING, record) for name in MODES], dtype=object)
         found[record.name] = ContactMotion(
             names[mode][before] if n_steps else np.array([names[0]] * len(solution.t), dtype=object), values[:, 4 * place],
-            (impulses / stepped.h[:, None])[before] if n_steps else none, values[:, [4 * n + r for r in rows[1:]]],
+            (impulses / stepped.h[:, None])[before] if n_steps else none, values[:, [4 * n + r for r in rows[record.normal:]]],
             summed[stepped.row], hits, np.zeros(0), tuple((float(stepped.t[k]), str(names[mode[k]])) for k in changes))
     return found
 

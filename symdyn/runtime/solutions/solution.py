@@ -296,7 +296,7 @@ class Solution:
         """
         change = self.energy - self.energy[0]
         touching = {f"{contact.name}_closes" for contact in self.module.metadata.contacts}
-        friction = friction_energy(self)
+        friction = friction_energy(self) if self._stepped is None else {}
         parts = {"work": self.work - sum(friction.values()), **friction}
         touched = {f"{contact.name}_{what}" for contact in self.module.metadata.compliant for what in ("touches", "releases")}
         for name, rows in self.reset_energy.items():

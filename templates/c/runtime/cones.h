@@ -4,7 +4,7 @@
 // Relative velocities are w = free + J du, du = M^-1 J^T P, row by row: the first row of a contact is along its normal, one or
 // two more along its tangents. Wanted is P with P_n >= 0, w_n >= 0, P_n w_n = 0, and |P_t| <= mu P_n, P_t = -mu P_n w_t/|w_t|
 // where w_t is not zero. That is the root of P_n - max(0, P_n - w_n/d_n) and of P_t - (P_t - w_t/d_t projected onto the disc of
-// radius mu P_n).
+// radius mu P_n). Dry friction of a joint has no normal row: the radius of its disc is given.
 //
 // Source: Alart and Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods, 1991;
 // Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, chapters 12 and 13.
@@ -22,6 +22,19 @@ static double symdyn_cones_along(const symdyn_cones *c, long r, const double *du
 static void symdyn_cones_push(const symdyn_cones *c, long r, double impulse, double *du) {
     for (long e = c->entry[r]; e < c->entry[r + 1]; e++) du[c->speed[e]] += c->answer[e] * impulse;
 }
+
+// How many of a contact's rows, which come first, are along its normal: one, or none.
+static long symdyn_cones_lead(const symdyn_cones *c, long i) { return c->bounded[i] ? 0 : 1; }
+
+// The radius of the disc that a contact's tangential impulses are in.
+static double symdyn_cones_radius(const symdyn_cones *c, long i) {
+    if (c->bounded[i]) return c->friction[i];
+    const double normal = c->P[c->first[i]];
+    return c->friction[i] * (normal > 0.0 ? normal : 0.0);
+}
+
+// Whether nothing moves along a contact.
+static int symdyn_cones_idle(const symdyn_cones *c, long i) { return !((c->bounded[i] ? c->d_t[i] : c->d_n[i]) > 0.0); }
 
 // du of all impulses.
 static void symdyn_cones_total(const symdyn_cones *c, const double *P, double *du) {
@@ -41,37 +54,41 @@ static void symdyn_cones_prepare(symdyn_cones *c) {
             for (long j = 0; j < m; j++) D[3 * j + k] = symdyn_cones_along(c, a + j, c->du);
             for (long e = c->entry[a + k]; e < c->entry[a + k + 1]; e++) c->du[c->speed[e]] = 0.0;
         }
-        c->d_n[i] = D[0];
-        const double mean = 0.5 * (D[4] + D[8]), half = 0.5 * (D[4] - D[8]), across = 0.5 * (D[5] + D[7]);
-        c->d_t[i] = m < 2 ? 0.0 : m < 3 ? D[4] : mean + sqrt(half * half + across * across);
+        const long lead = symdyn_cones_lead(c, i);
+        const double *T = D + 4 * lead;
+        const double mean = 0.5 * (T[0] + T[4]), half = 0.5 * (T[0] - T[4]), across = 0.5 * (T[1] + T[3]);
+        c->d_n[i] = lead ? D[0] : 0.0;
+        c->d_t[i] = m == lead ? 0.0 : m == lead + 1 ? T[0] : mean + sqrt(half * half + across * across);
     }
     symdyn_cones_total(c, c->P, c->du);
 }
 
 // One contact of a sweep: its impulses as those of the others are. Returns by how much it was off, m/s.
 static double symdyn_cones_one(symdyn_cones *c, long i) {
-    const long a = c->first[i], m = c->first[i + 1] - a;
-    double *P = c->P + a;
-    if (!(c->d_n[i] > 0.0)) return 0.0;
-    const double normal = P[0] - (c->free[a] + symdyn_cones_along(c, a, c->du)) / c->d_n[i];
-    const double change = (normal > 0.0 ? normal : 0.0) - P[0];
-    double off = fabs(change) * c->d_n[i];
-    if (change != 0.0) {
-        P[0] += change;
-        symdyn_cones_push(c, a, change, c->du);
+    const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
+    double *P = c->P + a, off = 0.0;
+    if (symdyn_cones_idle(c, i)) return 0.0;
+    if (lead) {
+        const double normal = P[0] - (c->free[a] + symdyn_cones_along(c, a, c->du)) / c->d_n[i];
+        const double change = (normal > 0.0 ? normal : 0.0) - P[0];
+        off = fabs(change) * c->d_n[i];
+        if (change != 0.0) {
+            P[0] += change;
+            symdyn_cones_push(c, a, change, c->du);
+        }
     }
-    if (m < 2 || !(c->d_t[i] > 0.0)) return off;
-    double z[2] = {0.0, 0.0}, size = 0.0;
-    const double radius = c->friction[i] * P[0];
-    for (long k = 1; k < m; k++) {
-        z[k - 1] = P[k];
-        if (radius > 0.0) z[k - 1] -= (c->free[a + k] + symdyn_cones_along(c, a + k, c->du)) / c->d_t[i];
-        size += z[k - 1] * z[k - 1];
+    if (m == lead || !(c->d_t[i] > 0.0)) return off;
+    double z[3] = {0.0, 0.0, 0.0}, size = 0.0;
+    const double radius = symdyn_cones_radius(c, i);
+    for (long k = lead; k < m; k++) {
+        z[k] = P[k];
+        if (radius > 0.0) z[k] -= (c->free[a + k] + symdyn_cones_along(c, a + k, c->du)) / c->d_t[i];
+        size += z[k] * z[k];
     }
     size = sqrt(size);
     const double scale = size > radius ? radius / size : 1.0;
-    for (long k = 1; k < m; k++) {
-        const double by = scale * z[k - 1] - P[k];
+    for (long k = lead; k < m; k++) {
+        const double by = scale * z[k] - P[k];
         if (by == 0.0) continue;
         P[k] += by;
         symdyn_cones_push(c, a + k, by, c->du);
@@ -90,12 +107,12 @@ static double symdyn_cones_sweep(symdyn_cones *c, int back) {
 
 // What a contact's impulses are projected from: normal and tangents, and the radius of the disc. Returns the tangents' size.
 static double symdyn_cones_trial(const symdyn_cones *c, long i, double *z, double *radius) {
-    const long a = c->first[i], m = c->first[i + 1] - a;
+    const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
     double square = 0.0;
-    z[0] = c->P[a] - c->w[a] / c->d_n[i];
-    z[1] = z[2] = 0.0;
-    *radius = c->friction[i] * (c->P[a] > 0.0 ? c->P[a] : 0.0);
-    for (long k = 1; k < m; k++) {
+    z[0] = z[1] = z[2] = 0.0;
+    if (lead) z[0] = c->P[a] - c->w[a] / c->d_n[i];
+    *radius = symdyn_cones_radius(c, i);
+    for (long k = lead; k < m; k++) {
         z[k] = c->P[a + k] - (*radius > 0.0 && c->d_t[i] > 0.0 ? c->w[a + k] / c->d_t[i] : 0.0);
         square += z[k] * z[k];
     }
@@ -107,15 +124,15 @@ static double symdyn_cones_residual(symdyn_cones *c) {
     double worst = 0.0;
     symdyn_cones_total(c, c->P, c->du);
     for (long i = 0; i < c->n; i++) {
-        const long a = c->first[i], m = c->first[i + 1] - a;
+        const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
         double z[3], radius;
         for (long k = 0; k < m; k++) c->w[a + k] = c->free[a + k] + symdyn_cones_along(c, a + k, c->du);
-        c->state[i] = 0;
-        if (!(c->d_n[i] > 0.0)) continue;
+        c->state[i] = c->bounded[i];
+        if (symdyn_cones_idle(c, i)) continue;
         const double size = symdyn_cones_trial(c, i, z, &radius), scale = size > radius ? radius / size : 1.0;
-        worst = fmax(worst, fabs((z[0] > 0.0 ? z[0] : 0.0) - c->P[a]) * c->d_n[i]);
-        for (long k = 1; k < m; k++) worst = fmax(worst, fabs(scale * z[k] - c->P[a + k]) * c->d_t[i]);
-        c->state[i] = !(z[0] > 0.0) ? 0 : m < 2 || size > radius || !(radius > 0.0) ? 2 : 1;
+        if (lead) worst = fmax(worst, fabs((z[0] > 0.0 ? z[0] : 0.0) - c->P[a]) * c->d_n[i]);
+        for (long k = lead; k < m; k++) worst = fmax(worst, fabs(scale * z[k] - c->P[a + k]) * c->d_t[i]);
+        c->state[i] = lead && !(z[0] > 0.0) ? 0 : m == lead || size > radius || !(radius > 0.0) ? 2 : 1;
     }
     return worst;
 }
@@ -153,20 +170,19 @@ static int symdyn_cones_eliminate(double *A, double *b, long n) {
 
 // Rows of a slipping contact: P_t - mu P_n z/|z| = 0 along z/|z| and across it, in place of the rows of D.
 static void symdyn_cones_slip_rows(const symdyn_cones *c, long i, long row, long n, double *A, double *right) {
-    const long a = c->first[i], m = c->first[i + 1] - a;
-    double z[3], radius, part[2] = {0.0, 0.0};
+    const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
+    double z[3], radius, part[3] = {0.0, 0.0, 0.0};
     const double size = symdyn_cones_trial(c, i, z, &radius), bend = size > 0.0 ? radius / size : 0.0;
-    for (long k = 1; k < m; k++) part[k - 1] = size > 0.0 ? z[k] / size : 0.0;
+    for (long k = lead; k < m; k++) part[k] = size > 0.0 ? z[k] / size : 0.0;
     for (long j = 0; j < n; j++) {
-        const double one = A[(row + 1) * n + j], two = m > 2 ? A[(row + 2) * n + j] : 0.0;  // scaled by d_t
-        const double inward = part[0] * one + part[1] * two;
-        A[(row + 1) * n + j] = bend * (one - part[0] * inward);
-        if (m > 2) A[(row + 2) * n + j] = bend * (two - part[1] * inward);
+        double inward = 0.0;
+        for (long k = lead; k < m; k++) inward += part[k] * A[(row + k) * n + j];  // scaled by d_t
+        for (long k = lead; k < m; k++) A[(row + k) * n + j] = bend * (A[(row + k) * n + j] - part[k] * inward);
     }
-    for (long k = 1; k < m; k++) {
-        for (long l = 1; l < m; l++) A[(row + k) * n + row + l] += (k == l) - bend * ((k == l) - part[k - 1] * part[l - 1]);
-        A[(row + k) * n + row] -= c->friction[i] * part[k - 1];
-        right[row + k] = radius * part[k - 1] - c->P[a + k];
+    for (long k = lead; k < m; k++) {
+        for (long l = lead; l < m; l++) A[(row + k) * n + row + l] += (k == l) - bend * ((k == l) - part[k] * part[l]);
+        if (lead) A[(row + k) * n + row] -= c->friction[i] * part[k];
+        right[row + k] = radius * part[k] - c->P[a + k];
     }
 }
 
@@ -198,14 +214,14 @@ static int symdyn_cones_newton(symdyn_cones *c) {
     long row = 0;
     for (long i = 0; i < c->n; i++) {
         if (!c->state[i]) continue;
-        const long a = c->first[i], m = c->first[i + 1] - a;
+        const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
         for (long k = 0; k < m; k++) {
-            const double d = k ? c->d_t[i] : c->d_n[i];
+            const double d = k < lead ? c->d_n[i] : c->d_t[i];
             for (long j = 0; j < n; j++) A[(row + k) * n + j] = d > 0.0 ? A[(row + k) * n + j] / d : 0.0;
             right[row + k] = d > 0.0 ? -c->w[a + k] / d : 0.0;
             A[(row + k) * n + row + k] += d > 0.0 ? little : 1.0;
         }
-        if (m > 1 && c->state[i] == 2) symdyn_cones_slip_rows(c, i, row, n, A, right);
+        if (m > lead && c->state[i] == 2) symdyn_cones_slip_rows(c, i, row, n, A, right);
         row += m;
     }
     if (!symdyn_cones_eliminate(A, right, n)) return 0;

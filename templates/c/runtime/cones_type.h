@@ -10,6 +10,7 @@ typedef struct {
     long *entry;                   // entries of row r: entry[r] to entry[r + 1]
     long *speed;                   // of an entry
     double *along, *answer;        // entries of J and of (M^-1 J^T)^T
+    int *bounded;                  // 1: a contact without a normal row, whose impulses are bounded by friction alone, N s
     double *friction;              // mu of a contact
     double *free, *P, *w;          // by row
     double *d_n, *d_t;             // of a contact: diagonal of D = J M^-1 J^T, the larger eigenvalue of its tangents

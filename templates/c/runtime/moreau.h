@@ -24,6 +24,10 @@ enum {
 
 enum { SYMDYN_OPEN = 0, SYMDYN_STICKING = 1, SYMDYN_SLIDING = 2 };
 
+// What of a contact with a name closes: a gap; a speed, of a one-way clutch; nothing, of dry friction of a joint, which has no
+// normal row.
+enum { SYMDYN_PLACED = 0, SYMDYN_SPEED = 1, SYMDYN_BOUNDED = 2 };
+
 // Let all frames look at a time and a state.
 static int symdyn_look(symdyn_moreau *s, double t, const double *x) {
     *s->t = t;
@@ -97,6 +101,9 @@ static const double *symdyn_coefficients(const symdyn_moreau *s, long i) {
     return s->b[i] < 0 ? s->gap + 4 * s->a[i] + 1 : s->sphere + 3 * s->group_of[s->a[i]];
 }
 
+// Whether a contact is dry friction of a joint.
+static int symdyn_bounded(const symdyn_moreau *s, long i) { return s->b[i] < 0 && s->given_kind[s->a[i]] == SYMDYN_BOUNDED; }
+
 static long symdyn_rows(const symdyn_moreau *s, long i) {
     if (s->b[i] < 0) return s->given_first[s->a[i] + 1] - s->given_first[s->a[i]];
     const double *coefficients = symdyn_coefficients(s, i);
@@ -132,6 +139,7 @@ static int symdyn_assemble(symdyn_moreau *s, symdyn_cones *c, double t, const do
     c->first[0] = c->entry[0] = 0;
     for (long i = 0; i < s->n_found; i++) {
         const long m = normals ? 1 : symdyn_rows(s, i);
+        c->bounded[i] = symdyn_bounded(s, i);
         if (s->b[i] < 0) {
             symdyn_given_rows(s, c, s->a[i], m);
         } else {
@@ -144,11 +152,11 @@ static int symdyn_assemble(symdyn_moreau *s, symdyn_cones *c, double t, const do
     return 0;
 }
 
-// The contacts whose gap is at most reach at what the frames looked at last.
-static int symdyn_find(symdyn_moreau *s, symdyn_cones *c, double reach) {
+// The contacts whose gap is at most reach at what the frames looked at last; speeds: and elements of joints without a gap.
+static int symdyn_find(symdyn_moreau *s, symdyn_cones *c, double reach, int speeds) {
     s->n_found = 0;
     for (long i = 0; i < s->n_given; i++) {
-        if (!(s->gap[4 * i] <= reach)) continue;
+        if (s->given_kind[i] == SYMDYN_PLACED ? !(s->gap[4 * i] <= reach) : !speeds) continue;
         s->a[s->n_found] = i;
         s->b[s->n_found++] = -1;
     }
@@ -161,7 +169,7 @@ static int symdyn_part(symdyn_moreau *s, symdyn_cones *c, double t, double *x) {
     for (int round = 0; round < 8; round++) {
         double deep = 0.0;
         int failed = symdyn_gaps(s, t, x);
-        if (!failed) failed = symdyn_find(s, c, 0.0);
+        if (!failed) failed = symdyn_find(s, c, 0.0, 0);
         if (failed) return failed;
         for (long i = 0; i < s->n_found; i++) {
             double w[3], basis[9] = {0.0};
@@ -171,7 +179,7 @@ static int symdyn_part(symdyn_moreau *s, symdyn_cones *c, double t, double *x) {
             s->worst_depth = fmax(s->worst_depth, deep);
             return 0;
         }
-        failed = symdyn_find(s, c, 2.0 * deep);
+        failed = symdyn_find(s, c, 2.0 * deep, 0);
         if (!failed) failed = symdyn_assemble(s, c, t, x, 1);
         if (failed) return failed;
         for (long i = 0; i < c->n; i++) {
@@ -206,27 +214,40 @@ static long symdyn_earlier(const symdyn_moreau *s, long i) {
     return -1;
 }
 
-// What contacts bring into a step from the one before: impulses to start from, whether they stuck; coefficients of friction.
-static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c) {
+// What friction of a contact is bounded by, in a step of length h: a coefficient, of friction of a joint an impulse.
+static double symdyn_bound(const symdyn_moreau *s, long i, int sticks, double h) {
+    const double *coefficients = symdyn_coefficients(s, i);
+    return coefficients[sticks ? 0 : 1] * (symdyn_bounded(s, i) ? h : 1.0);
+}
+
+// Whether nothing slips in a contact at the begin of the step.
+static int symdyn_still(const symdyn_moreau *s, const symdyn_cones *c, long i) {
+    double square = 0.0;
+    for (long k = c->bounded[i] ? 0 : 1; k < 3; k++) square += s->incoming[3 * i + k] * s->incoming[3 * i + k];
+    return sqrt(square) <= s->tolerance;
+}
+
+// What contacts bring into a step from the one before: impulses to start from, whether they stuck; bounds of friction.
+static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c, double h) {
     for (long i = 0; i < c->n; i++) {
         const long old = symdyn_earlier(s, i), r = c->first[i];
         const double *mu = symdyn_coefficients(s, i);
-        const int stuck = old >= 0 && s->old_state[old] == SYMDYN_STICKING;
+        const int stuck = old < 0 || !s->old_state[old] ? symdyn_still(s, c, i) : s->old_state[old] == SYMDYN_STICKING;
         for (long k = r; k < c->first[i + 1]; k++) c->P[k] = old < 0 ? 0.0 : s->P_old[3 * old + k - r];
         s->broken[i] = !stuck || !(mu[0] > mu[1]);
-        c->friction[i] = stuck ? mu[0] : mu[1];
+        c->friction[i] = symdyn_bound(s, i, stuck, h);
     }
 }
 
 // Solve for the impulses; contacts that stuck and slip now have kinetic friction.
-static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c) {
+static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h) {
     for (int again = 1; again;) {
         symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
         again = 0;
         for (long i = 0; i < c->n; i++)
             if (!s->broken[i] && c->state[i] == SYMDYN_SLIDING) {
                 s->broken[i] = again = 1;
-                c->friction[i] = symdyn_coefficients(s, i)[1];
+                c->friction[i] = symdyn_bound(s, i, 0, h);
             }
     }
 }
@@ -243,7 +264,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
         if (s->n_found && (round < 4 || round % 8 == 0)) {
             failed = symdyn_assemble(s, c, t + 0.5 * h, middle, 0);
             if (failed) return failed;
-            if (!round) symdyn_bring(s, c);
+            if (!round) symdyn_bring(s, c, h);
         }
         failed = symdyn_rate(s, t + 0.5 * h, middle);
         if (failed) return failed;
@@ -263,9 +284,9 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
                 for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
                 symdyn_contact_now(s, i, m, basis, w);
                 for (long k = 0; k < m; k++) c->free[r + k] = w[k] - symdyn_cones_along(c, r + k, kick);
-                if (s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
+                if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
             }
-            symdyn_impulses(s, c);
+            symdyn_impulses(s, c, h);
             for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
         }
         off = 0.0;
@@ -284,7 +305,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
     return 0;
 }
 
-// Keep what contacts did: what the next step starts from, velocities and gaps at the end, losses.
+// Keep what contacts did: what the next step starts from, velocities and gaps at the end.
 static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double *x) {
     const int failed = symdyn_gaps(s, t, x);
     if (failed) return failed;
@@ -295,12 +316,7 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
         for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
         for (int k = 0; k < 4; k++) end[k] = 0.0;
         end[0] = symdyn_contact_now(s, i, m, basis, end + 1);
-        double loss = 0.0;
-        for (int k = 0; k < 3; k++) {
-            s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
-            if (k < m) loss -= 0.5 * c->P[r + k] * (s->incoming[3 * i + k] + end[1 + k]);
-        }
-        s->loss_of[s->b[i] < 0 ? s->a[i] : s->n_given + s->group_of[s->a[i]]] += loss;
+        for (int k = 0; k < 3; k++) s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
         s->old_a[i] = s->a[i];
         s->old_b[i] = s->b[i];
         s->old_state[i] = c->state[i];
@@ -326,7 +342,7 @@ static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
         s->was_a[i] = s->a[i];
         s->was_b[i] = s->b[i];
     }
-    const int failed = symdyn_find(s, c, s->depth);
+    const int failed = symdyn_find(s, c, s->depth, 1);
     if (failed) return failed;
     long n = 0, i = 0, j = 0;
     *added = 0;

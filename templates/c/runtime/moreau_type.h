@@ -6,6 +6,7 @@ typedef struct {
     int n_q, n_u, n_x, n_in, n_c, n_units;  // n_x: with what is integrated besides the state; constraints, unit vectors
     long n_given, n_rows;                   // contacts with a name of their own, and their rows
     const long *given_first;                // rows of these: given_first[i] to given_first[i + 1]
+    const int *given_kind;                  // SYMDYN_PLACED, SYMDYN_SPEED or SYMDYN_BOUNDED
     const long *unit_first, *unit_index;    // coordinates that form unit vectors
 
     int (*field)(void *frame);  // x_dot with all contacts open
@@ -48,10 +49,9 @@ typedef struct {
     long *a, *b, *was_a, *was_b, *sum_a, *sum_b, *old_a, *old_b, *old_from, n_old;
     int *old_state, *broken;
     double *P_old, *basis, *incoming, *gap_of, *kept_P;
-    long n_found;                              // contacts of the latest step
-    double *at_end;                            // n*4: gap, then relative velocities at its end
-    double worst_residual, worst_depth, loss;  // of all steps so far; energy that contacts have taken
-    double *loss_of;                           // by contact with a name, then by group
+    long n_found;                        // contacts of the latest step
+    double *at_end;                      // n*4: gap, then relative velocities at its end
+    double worst_residual, worst_depth;  // of all steps so far
     long n_steps, n_rounds, n_evaluations;
     int reason;
 } symdyn_moreau;
