@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -262,6 +263,16 @@ def test_kernels_compile_for_a_gpu(name: str) -> None:
     unit: Any = compiled(name).unit(RightSide(threads=True))
     code = compiling.ptx(unit.source, name, "compute_90").decode()
     assert f".entry {unit.metadata.name}_motions(" in code and "fma.rn.f64" in code
+
+
+def test_the_stack_of_a_kernel_is_bounded() -> None:
+    """A device sets the stack aside before a kernel begins: without recursion and without calls of addresses it is known."""
+    pytest.importorskip("cuda.bindings")
+    unit: Any = compiled("cart_pole").unit(RightSide(threads=True))
+    assert "->function(" not in unit.source
+    printed = compiling.report(unit.source, "cart_pole", "sm_90")
+    found = re.search(r"Used \d+ registers, .* (\d+) bytes cumulative stack size", printed)
+    assert found is not None and 1000 < int(found[1]) < 10_000
 
 
 def test_what_is_no_cuda_is_reported_with_the_compilers_words() -> None:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 LONG = 12_000
 BASIC = ("embedding", "recursive", "augmented", "absolute", "absolute:angles")
 GIVEN = "given"
-TOUCHES = ("its motion switches at rigid contacts, and references are of smooth equations; symdyn bench contacts compares methods "
-           "on motions that touch")
+TOUCHES = ("its motion switches at rigid contacts, and references are of smooth equations; symdyn bench contacts compares "
+           "methods on motions that touch")
 
 
 @dataclass(frozen=True, eq=False)

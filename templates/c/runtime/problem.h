@@ -11,7 +11,9 @@ enum { SYMDYN_INPUT_STOPPED = 100000 };
 static inline int symdyn_inputs_at(const symdyn_problem *problem, double t, const double *x, double *out) {
     const double *at = problem->breaks;
     long low = 0, high = problem->n_pieces;
+#if !SYMDYN_THREADS
     if (problem->function) return problem->function(t, x, out) ? SYMDYN_INPUT_STOPPED : 0;
+#endif
     if (high == 0) {
         for (int k = 0; k < SYMDYN_NIN; k++) out[k] = problem->inputs[k];
         return 0;
