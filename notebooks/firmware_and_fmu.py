@@ -95,7 +95,7 @@ path = module.to_fmu(folder / "arm.fmu", version=3, kind="co_simulation")
 print(path.name, path.stat().st_size // 1000, "kB")
 
 # %% [markdown]
-# FMPy, a program that knows nothing of symdyn, imports it (`pip install fmpy`):
+# FMPy, a program that is independent of symdyn, imports it (`pip install 'symdyn[fmu]'`):
 
 # %%
 try:
