@@ -11,6 +11,7 @@ from symdyn.errors import SymdynError
 from symdyn.folders import templates_folder
 
 _NUMBERS: dict[str, Any] = {"double": ctypes.c_double, "int": ctypes.c_int, "long": ctypes.c_long}
+_RESULTS: dict[str, Any] = {**_NUMBERS, "void": None}
 _RECORD = re.compile(r"typedef struct \{(?P<body>.*?)\} (?P<name>[\w{} ]+);", re.DOTALL)
 _FUNCTION = re.compile(r"(?P<result>\w+) \(\*(?P<name>\w+)\)\((?P<arguments>[^)]*)\)")
 _MEMBERS = re.compile(r"(?:const )?(?P<kind>\w+) (?P<names>[\w*, ]+)")
@@ -36,7 +37,7 @@ def fields_of(file: str) -> list[tuple[str, Any]]:
         function, members = _FUNCTION.fullmatch(member), _MEMBERS.fullmatch(member)
         if function:
             kinds = [_argument(a.strip()) for a in function["arguments"].split(",")]
-            fields.append((function["name"], ctypes.CFUNCTYPE(_NUMBERS[function["result"]], *kinds)))
+            fields.append((function["name"], ctypes.CFUNCTYPE(_RESULTS[function["result"]], *kinds)))
         elif members and (members["kind"] in _NUMBERS or members["names"].startswith("*")):
             for name in (n.strip() for n in members["names"].split(",")):
                 fields.append((name.lstrip("*"), ctypes.c_void_p if name.startswith("*") else _NUMBERS[members["kind"]]))
@@ -51,7 +52,8 @@ def codes_of(file: str) -> dict[str, int]:
 
 
 def _argument(text: str) -> Any:
+    text = text.removeprefix("const ")
     if text.startswith("void *"):
         return ctypes.c_void_p
-    kind = _NUMBERS[text.removeprefix("const ").split()[0]]
+    kind = _NUMBERS[text.split()[0]]
     return ctypes.POINTER(kind) if "*" in text else kind

@@ -1173,6 +1173,18 @@ class Module:
         """The loaded unit that has a function, or a right-hand side with its integrator."""
         return self._unit(what)
 
+    def has(self, what: str | RightSide) -> bool:
+        """Whether a unit is loaded already."""
+        return (RightSide() if what == "rhs" else what) in self._units
+
+    def remembered(self, name: str, make: Callable[[], Any]) -> Any:
+        """What was made for this thread under a name, made now if it was not."""
+        known = getattr(self._local, name, None)
+        if known is None:
+            known = make()
+            setattr(self._local, name, known)
+        return known
+
     def _unit(self, what: str | RightSide) -> Unit:
         what = RightSide() if what == "rhs" else what
         if what not in self._units:

@@ -13,10 +13,12 @@ from symdyn.errors import SymdynError
 from symdyn.runtime.batches.states import Table
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
+from symdyn.runtime.integrating.hybrid import PhaseCode, Record
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
 
 RECORDS = {"runtime/report_type.h": (RunReport, "symdyn_report"), "runtime/problem_type.h": (Problem, "symdyn_problem"),
-           "runtime/table_type.h": (Table, "symdyn_table")}
+           "runtime/table_type.h": (Table, "symdyn_table"), "runtime/hybrid_type.h": (Record, "symdyn_hybrid"),
+           "runtime/phase_code_type.h": (PhaseCode, "symdyn_phase_code")}
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

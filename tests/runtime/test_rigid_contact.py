@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, ModelError, SimulationWarning
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Solved, impact, solutions
-from symdyn.runtime.integrating import contacts
+from symdyn.runtime.integrating import contacts, hybrid
 
 G = 9.81
 
@@ -205,6 +205,13 @@ def test_impacts_lose_energy_by_poissons_law_and_have_one_solution() -> None:
             assert law == "newton" or (v + found[0].w) @ found[0].lam <= 1e-12
 
 
+@pytest.fixture
+def in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every switch is made in Python."""
+    monkeypatch.setattr(hybrid, "of", lambda *given: None)
+
+
+@pytest.mark.usefixtures("in_python")
 def test_what_happens_at_many_instants_is_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ball(restitution=0.9).compile()
     monkeypatch.setattr(contacts, "impact", lambda *given: 2 * impact(*given))
@@ -217,6 +224,7 @@ def test_what_happens_at_many_instants_is_one_warning(monkeypatch: pytest.Monkey
                      r"latest t = 2\.\d+ s, at contacts floor$", message), message
 
 
+@pytest.mark.usefixtures("in_python")
 def test_energy_of_the_size_of_rounding_is_not_reported(monkeypatch: pytest.MonkeyPatch,
                                                         recwarn: pytest.WarningsRecorder) -> None:
     """An impact on paper, with which the ball leaves at 10 m/s, of an impulse that is next to nothing, and of one that counts."""
@@ -229,6 +237,7 @@ def test_energy_of_the_size_of_rounding_is_not_reported(monkeypatch: pytest.Monk
         assert len([w for w in recwarn if "adds" in str(w.message)]) == reported
 
 
+@pytest.mark.usefixtures("in_python")
 def test_modes_that_do_not_settle_and_impacts_without_solution_stop_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     module = ball(restitution=0.9).compile()
     with monkeypatch.context() as patched:

@@ -24,6 +24,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
+from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.slip_begins import SlipBegins
 from symdyn.runtime.integrating.stops import describe_stop
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 Part = Callable[[Request, bool, bool], Outcome]
-CONTACTS, SHARED, HOLDING = "contacts", "contacts_shared", "contacts_holding"
+HOLDING = "contacts_holding"
 # Gaps, m, and velocities, m/s, that count as none at the start.
 TOUCHING = 1e-9
 # Gaps, by the size of the state, that close together with another contact.
@@ -54,6 +55,9 @@ MOST_FAST = 200
 # What is added to the diagonal of rows that depend on each other, by its size.
 SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
+# Energy that an impact adds counts from this part of its work on.
+GAINED = 1e-9
+LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWEST_FLIGHT)
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
 # A speed, m/s, that no slip comes near: added to the slip it holds the direction of friction.
@@ -194,12 +198,13 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
 
 
 def run_contacts(module: Module, request: Request, part: Part, method: object = None,
-                 crossed: list[Switch] | None = None) -> Outcome:
+                 crossed: list[Switch] | None = None, quick: Motion | None = None) -> Outcome:
     """Integrate with rigid contacts.
 
     part     integrates a request in one mode; by an implicit method, and with all contacts open, if so wanted
     method   the one that it integrates by else
     crossed  takes the switches, for a way back
+    quick    goes through phases and switches in C, as far as it can
 
     Raises ArgumentError for what contacts do not take, TooFast where switches come faster than one in request.step.
     """
@@ -213,7 +218,7 @@ def run_contacts(module: Module, request: Request, part: Part, method: object = 
     if request.inputs.are_held:
         raise ArgumentError(f"{module.name}: controllers whose values are held between instants do not go with rigid contacts; "
                             "pass their law as an expression of the system, or as a function of (t, x)")
-    phases = _Phases(module, request, part, keeps=crossed is not None, crossed=[] if crossed is None else crossed)
+    phases = _Phases(module, request, part, keeps=crossed is not None, crossed=[] if crossed is None else crossed, quick=quick)
     return phases.through()
 
 
@@ -267,6 +272,7 @@ class _Phases:
     keeps: bool = False  # whether switches are kept for a way back
     crossed: list[Switch] = field(default_factory=list)
     made: list[Made] = field(default_factory=list)  # at the latest switch
+    quick: Motion | None = None
 
     def __post_init__(self) -> None:
         metadata = self.module.metadata
@@ -313,45 +319,120 @@ class _Phases:
     def through(self) -> Outcome:
         """To the end, or as far as it gets."""
         request = self.request
-        t, end = request.span
+        self.t, end = request.span
         last = end if request.times is None else float(request.times[-1])
-        x, message, cause, interrupted, over = request.x0.copy(), "", None, False, False
-        fired: list[tuple[int, str]] = []
-        begun, located = True, False
+        self.x, message, cause, interrupted, over = request.x0.copy(), "", None, False, False
+        self.fired: list[tuple[int, str]] = []
+        self.begun = True
+        located = False
+        if self.quick is not None:
+            self.quick.start(request, LAWS, self.same)
         try:
             while True:
-                if begun or fired:
-                    x = self._switched(t, x, fired, begun, located)
-                begun = False
-                outcome = self._phase(t, x)
+                if self.quick is not None and self._is_plain():
+                    located = located or bool(self.fired)
+                    if self._quickly(self.quick):
+                        break
+                    located = bool(self.fired)
+                if self.begun or self.fired:
+                    self.x = self._switched(self.t, self.x, self.fired, self.begun, located)
+                self.begun = False
+                outcome = self._phase(self.t, self.x)
                 if not outcome.success:
                     break
-                start, t, x = t, float(outcome.t[-1]), outcome.x[-1]
-                self._demand_seen(t, x, t - start)
+                start, self.t, self.x = self.t, float(outcome.t[-1]), outcome.x[-1]
+                self._demand_seen(self.t, self.x, self.t - start)
                 latest = [one for one in outcome.happened if one.t == outcome.happened[-1].t] if outcome.happened else []
-                fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
+                self.fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
                 if any(self.module.metadata.events[one.event].stop and one.event not in self.of_event for one in latest):
                     over = True
                     message = outcome.message
                     break
-                until = float(latest[-1].t) if fired else min(self.until, end)
-                located = bool(fired)
-                if fired:
-                    x = latest[-1].before.copy()
+                until = float(latest[-1].t) if self.fired else min(self.until, end)
+                located = bool(self.fired)
+                if self.fired:
+                    self.x = latest[-1].before.copy()
                 elif until >= last:
                     break
                 else:
-                    x, fired = self._slipped(until, x)
-                self._count(until - start, until, fired)
-                t = until
+                    self.x, self.fired = self._slipped(until, self.x)
+                self._count(until - start, until, self.fired)
+                self.t = until
                 if request.max_steps is not None and self.n_steps >= request.max_steps:
                     raise _Stop(f"{self.n_steps} steps were done, as asked")
         except KeyboardInterrupt:
-            interrupted, message = True, describe_stop(self.module.metadata, t, x[:request.n_state], "interrupted")
+            interrupted = True
+            message = describe_stop(self.module.metadata, self.t, self.x[:request.n_state], "interrupted")
         except (_Stop, EvaluationError) as error:
             why = str(error).removeprefix(f"{self.module.name}: ")
-            message, cause = describe_stop(self.module.metadata, t, x[:request.n_state], why), error.__cause__
-        return self._whole(t, x, message, cause, interrupted, over)
+            message, cause = describe_stop(self.module.metadata, self.t, self.x[:request.n_state], why), error.__cause__
+        return self._whole(self.t, self.x, message, cause, interrupted, over)
+
+    def _is_plain(self) -> bool:
+        """Whether nothing is under way at a switch, or before a phase, that C does not know of."""
+        return not (self.begins.directions or self.begins.since or self.unlooked or self.ruled_out or self.at_once or self.shared
+                    or self.until < np.inf)
+
+    def _quickly(self, quick: Motion) -> bool:
+        """Go on in C as far as that goes; whether it is the end."""
+        while True:
+            self._hand_over(quick)
+            assert self.request.times is not None
+            first = np.searchsorted(self.request.times, self.t, "right" if self.done else "left")
+            code = self._take_over(quick, quick.go(self.request.times[first:]))
+            if code == CODES.HYBRID_CONSTANTS:
+                self.quick = None
+            if code != CODES.HYBRID_FULL:
+                return code == CODES.HYBRID_DONE
+
+    def _hand_over(self, quick: Motion) -> None:
+        """Put what C goes on from into its record, with the events of the latest time, which impacts may change."""
+        record = quick.record
+        record.t, record.size, record.begins, record.n_fired = self.t, self.size, self.begun, len(self.fired)
+        quick.x[:] = self.x
+        quick.fired[:len(self.fired)] = [self.events[k][what] for k, what in self.fired]
+        quick.mode[:] = [MODES.index(mode) for mode in self.modes]
+        quick.still[:], quick.passed[:] = self.still, self.passed
+        quick.sign[:] = [direction.sum() for direction in self.directions]
+        latest = []
+        while self.fired and self.happened and self.happened[-1].t == self.t:
+            latest.append(self.happened.pop())
+        record.n_happened = len(latest)
+        for k, one in enumerate(reversed(latest)):
+            quick.happened[k], quick.happened_t[k] = one.event, one.t
+            quick.happened_states[k] = one.before, one.after
+
+    def _take_over(self, quick: Motion, done: Done) -> int:
+        """Note what C has done, and go on from there; the code by which it ended."""
+        record = quick.record
+        times, states = done.t, done.x
+        if done.begin:
+            self.done.append(done.outcome)
+            self.n_steps += done.outcome.n_steps
+        starts = [0, *done.written[:-1]]
+        impacts = [Impact(t, *rows) for t, rows in zip(done.impact_times, done.impacts, strict=True)]
+        happened = [Happened(k, t, *both) for k, t, both in zip(done.events, done.event_times, done.event_states, strict=True)]
+        seen, hit = 0, 0
+        for k, (begin, end) in enumerate(zip(done.begin, done.end, strict=True)):
+            self.phases.append(Phase(begin, done.p[k], tuple([MODES[mode] for mode in done.modes[k]])))
+            self.ts.append(times[starts[k]:done.written[k]])
+            self.xs.append(states[starts[k]:done.written[k]])
+            ended = happened[seen:done.happened_by[k]]
+            self.impacts += impacts[hit:done.impacts_by[k]]
+            self.happened += ended
+            seen, hit = done.happened_by[k], done.impacts_by[k]
+            fired = [self.of_event[one.event] for one in ended if one.t == end]
+            if fired:
+                self.t, self.x = end, ended[-1].before
+                self._count(end - begin, end, fired)
+        self.impacts += impacts[hit:]
+        self.happened += happened[seen:]
+        self.t, self.x, self.size, self.begun = record.t, quick.x.copy(), record.size, bool(record.begins)
+        self.fired = [self.of_event[k] for k in quick.fired[:record.n_fired].tolist()]
+        self.modes = [MODES[mode] for mode in quick.mode.tolist()]
+        self.still, self.passed = list(map(bool, quick.still.tolist())), list(map(bool, quick.passed.tolist()))
+        self.directions = [np.full(record.tangents, sign) for record, sign in zip(self.records, quick.sign.tolist(), strict=True)]
+        return done.code
 
     def _demand_seen(self, t: float, x: np.ndarray, passed: float) -> None:
         """Raise _Stop where an open contact overlaps, at the end of a phase."""
@@ -701,7 +782,7 @@ class _Phases:
         after[n_q:n_q + n_u] += at.speeds[:, places] @ one.lam
         gained = float((v + one.w) @ one.lam) / 2
         size = float(np.abs(v) @ np.abs(one.lam))
-        if gained > 1e-9 * size and gained > 1e-12 * self._kinetic_energy(t, x):
+        if gained > GAINED * size and gained > 1e-12 * self._kinetic_energy(t, x):
             self._doubt("energy", t, touching, f"the impact of {names} at t = {t:.9g} s adds {gained:.3g} J, as Newton's law may "
                         "with friction or several contacts; pass impact='poisson'", gained)
         impulses = np.zeros(len(at.slip))

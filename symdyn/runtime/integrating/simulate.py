@@ -21,6 +21,7 @@ from symdyn.real_numbers import length_of, number, number_of, real, real_of
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
+from symdyn.runtime.integrating import hybrid
 from symdyn.runtime.integrating.automatic import automatic
 from symdyn.runtime.integrating.charts import warn_near_lock
 from symdyn.runtime.integrating.compiled import run_compiled
@@ -178,7 +179,8 @@ def integrate(module: Module, request: Request, method: Any, bar: Any = None, cr
     if module.metadata.contacts:
         stiff = "radau" if is_compiled(method) else "Radau"
         return run_contacts(module, request, lambda part, slow, parted: _run_smooth(
-            module, part, stiff if slow else method, bar, parted), method, crossed)
+            module, part, stiff if slow else method, bar, parted), method, crossed,
+            hybrid.of(module, request, method) if bar is None and crossed is None else None)
     return _run_smooth(module, request, method, bar)
 
 

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "many.h"
+#include "modes.h"
 
 enum {
     SYMDYN_MOREAU_DONE = 0,
@@ -21,8 +22,6 @@ enum {
     SYMDYN_MOREAU_CONSTRAINTS = -6,
     SYMDYN_MOREAU_INPUTS = -7
 };
-
-enum { SYMDYN_OPEN = 0, SYMDYN_STICKING = 1, SYMDYN_SLIDING = 2 };
 
 // What of a contact with a name closes: a gap; a speed, of a one-way clutch; nothing, of dry friction of a joint, which has no
 // normal row.

@@ -1,0 +1,249 @@
+"""Motions with rigid contacts that go from phase to phase in C, as far as they need nothing that has to be thought about.
+
+The switches of symdyn.runtime.integrating.contacts in a plane, with Newton's law of impacts, of contacts whose rows do not depend
+on each other, are made in C between phases of the compiled integrator. Whatever else comes, such as slips that begin, several
+solutions, bouncing that ends, failures, is left to Python, after which C goes on.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn.backend.c_records import codes_of, fields_of
+from symdyn.backend.right_side import RightSide
+from symdyn.contact_kinds import CLUTCH
+from symdyn.runtime import contact_laws as laws
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.building.shared import shared
+from symdyn.runtime.integrating.compiled import FAR, Problem, events_waiting
+from symdyn.runtime.integrating.moreau_memory import Memory
+from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.stabilization import Corrections
+
+if TYPE_CHECKING:
+    from symdyn.backend.metadata import ContactRecord
+    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.module import Module
+
+CODES = SimpleNamespace(**codes_of("runtime/hybrid.h"))
+MODES = (laws.OPEN, laws.STICKING, laws.SLIDING)
+KINDS = ("closes", "opens", "sticks", "slips", "ignored", "counts")
+# Methods whose steps need no look in between; the law of impacts that C knows.
+METHODS, NEWTON = ("dop853", "bs54", "radau", "radau5"), "newton"
+# Phases, and attempted steps, of one call.
+MOST_PHASES, MOST_STEPS = 256, 20_000
+CONTACTS, EVENTS, SHARED = "contacts", "events", "contacts_shared"
+
+
+class PhaseCode(ctypes.Structure):
+    """Code that integrates phases; see c/runtime/phase_code_type.h."""
+
+    _fields_ = fields_of("runtime/phase_code_type.h")
+
+
+class Record(ctypes.Structure):
+    """A motion; see c/runtime/hybrid_type.h."""
+
+    _fields_ = fields_of("runtime/hybrid_type.h")
+    t: float
+    size: float
+    begins: int
+    n_fired: int
+    n_written: int
+    n_phases: int
+    n_happened: int
+    n_impacts: int
+
+
+class Laws(NamedTuple):
+    """Constants of the laws of contact, see symdyn.runtime.integrating.contacts, as the record calls them."""
+
+    touching: float
+    together: float
+    missed: float
+    no_speed: float
+    energy: float
+    shortest_flight: float
+    lowest_flight: float
+
+
+class Done(NamedTuple):
+    """What C has done in one call: why it ended; of each phase its begin, end, parameters (n, n_p), modes (n, n_contacts), and by
+    its end the numbers of output times, events and impacts; output times with states, events with their times and the states
+    before and after them (n, 2, n_x), impacts with their times, impulses and velocities before and after them (n, 3, n_rows)."""
+
+    code: int
+    begin: list[float]
+    end: list[float]
+    p: np.ndarray
+    modes: list[list[int]]
+    written: list[int]
+    happened_by: list[int]
+    impacts_by: list[int]
+    t: np.ndarray
+    x: np.ndarray
+    events: list[int]
+    event_times: list[float]
+    event_states: np.ndarray
+    impact_times: list[float]
+    impacts: np.ndarray
+    outcome: Outcome
+
+
+def of(module: Module, request: Request, method: object) -> Motion | None:
+    """What makes motions like this one in C; None where nothing of it could be made there."""
+    metadata, inputs = module.metadata, request.inputs
+    varies = inputs.function is not None or inputs.pieces is not None or inputs.motions is not None or inputs.are_held
+    if (method not in METHODS or varies or len(inputs.kinks) or request.columns or request.times is None or request.step
+            or request.max_steps is not None or request.stabilization.way == "baumgarte" or metadata.switches
+            or (request.look is not None and request.look.any())):
+        return None
+    if not all(_is_plain(record, metadata.parameters) for record in metadata.contacts) or find_compiler() is None:
+        return None
+    method = str(method)
+    motion: Motion = module.remembered(f"hybrid_{method}_{request.works}", lambda: Motion(module, method, request.works))
+    return motion
+
+
+def _is_plain(record: ContactRecord, parameters: Sequence[str]) -> bool:
+    """Whether C knows the switches of a contact."""
+    return (record.normal and record.rows <= 2 and record.kind != CLUTCH and record.impact == NEWTON
+            and all(name in parameters for name in record.parameters))
+
+
+class Motion:
+    """The record in C of motions of a module, one after the other, for one thread."""
+
+    def __init__(self, module: Module, method: str, works: bool) -> None:
+        self.module = module
+        metadata = module.metadata
+        records, sizes = metadata.contacts, metadata.sizes
+        self.fields = [RightSide(work=works, method=method, open_contacts=opened) for opened in (True, False)]
+        self.n, self.n_x, self.n_state = len(records), sizes.x + works, sizes.x
+        n, n_x, self.n_p = self.n, self.n_x, len(metadata.parameters)
+        n_rows, n_events = sum(record.rows for record in records), len(metadata.events)
+        self.library: Any = shared("hybrid", require_compiler())
+        self.memory = memory = Memory()
+        self.record = record = Record(
+            n_q=sizes.q, n_u=sizes.u, n_state=sizes.x, n_x=n_x, n_p=self.n_p, n_contacts=n, n_rows=n_rows, n_events=n_events,
+            most_steps=MOST_STEPS, most_phases=MOST_PHASES, most_happened=4 * MOST_PHASES + 2 * n_events,
+            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=laws.DEPENDENT, different=laws.DIFFERENT, far=FAR)
+        place = {name: k for k, name in enumerate(metadata.parameters)}
+        record.shared_at = place[SHARED]
+        events = {event.name: k for k, event in enumerate(metadata.events)}
+        tables = {
+            "first": np.cumsum([0, *[one.rows for one in records]])[:-1], "rows": [one.rows for one in records],
+            "closed_at": [place.get(one.closed, -1) for one in records],
+            "sticking_at": [place.get(one.sticking, -1) for one in records],
+            "sliding_at": [place[one.sliding[0]] if one.sliding else -1 for one in records],
+            "event": [events[f"{one.name}_{what}"] if what in one.events else -1 for one in records for what in KINDS]}
+        for name, values in tables.items():
+            memory.take(record, name, np.array(values, dtype=np.intc))
+        take, put = memory.take, memory.put
+        self.x, self.p, self.atol = take(record, "x", np.zeros(n_x)), take(record, "p", np.zeros(max(1, self.n_p))), take(
+            record, "atol", np.zeros(n_x))
+        self.mode, self.still, self.passed, self.fired, self.happened = (
+            take(record, name, np.zeros(size, dtype=np.intc)) for name, size in (
+                ("mode", n), ("still", n), ("passed", n), ("fired", n_events), ("happened", record.most_happened)))
+        self.sign = take(record, "sign", np.zeros(n))
+        put(record, np.intc, old_mode=n, old_still=n, old_passed=n, ruled_out=n, look=n_events, leaves=n)
+        put(record, float, old_sign=n, old_x=n_x, rows_of_events=events_waiting(n_events) * (2 + 2 * n_x),
+            states=max(2 * n_x, n_rows))
+        self.begin, self.end = (take(record, name, np.zeros(MOST_PHASES)) for name in ("phase_begin", "phase_end"))
+        self.phase_p = take(record, "phase_p", np.zeros((MOST_PHASES + 1, self.n_p)))
+        self.phase_mode = take(record, "phase_mode", np.zeros((MOST_PHASES, n), dtype=np.intc))
+        self.written, self.happened_by, self.impacts_by = (
+            take(record, name, np.zeros(MOST_PHASES, dtype=np.dtype("long")))
+            for name in ("phase_written", "phase_happened", "phase_impacts"))
+        self.happened_t = take(record, "happened_t", np.zeros(record.most_happened))
+        self.happened_states = take(record, "happened_states", np.zeros((record.most_happened, 2, n_x)))
+        self.impact_t = take(record, "impact_t", np.zeros(MOST_PHASES))
+        self.impact = take(record, "impact", np.zeros((MOST_PHASES, 3, n_rows)))
+        self.inputs = np.zeros(max(1, sizes.inputs))
+        self.problems: list[Problem] = []
+        self._functions()
+
+    def _functions(self) -> None:
+        """What frames evaluate."""
+        record, memory, module = self.record, self.memory, self.module
+        seen = np.zeros(1), np.zeros(max(1, self.n_state)), self.inputs
+        memory.take(record, "t_now", seen[0])
+        memory.take(record, "x_now", seen[1])
+        ignored = any("ignored" in one.events for one in module.metadata.contacts)
+        for name in (CONTACTS, *([EVENTS] if ignored else [])):
+            unit: Any = module.unit(name)
+            constants = memory.take(record, f"{name}_c", np.zeros(max(1, unit.metadata.n_c)))
+            setattr(record, f"n_{name}_c", unit.metadata.n_c)
+            prologue = f"{name}_prologue"
+            setattr(record, prologue, ctypes.cast(unit.function("prologue"), dict(Record._fields_)[prologue]))
+            memory.frame(record, name, unit, name, f"of_{name}", (*seen, self.p, constants))
+
+    def _phase_code(self, unit: CUnit) -> ctypes.c_void_p:
+        """The code of phases, of a unit with an integrator."""
+        code, keep = PhaseCode(n_constants=unit.metadata.n_c), self.memory.kept
+        members = {"prologue": "prologue", "start": "simulation_start", "go": "simulation_go", "look": "simulation_look",
+                   "take": "simulation_events", "report": "simulation_report"}
+        for member, function in members.items():
+            setattr(code, member, ctypes.cast(unit.function(function), dict(PhaseCode._fields_)[member]))
+        size = unit.function("simulation_size")
+        size.restype = ctypes.c_long
+        memory = np.zeros(size() // 8 + 16)
+        code.memory = (memory.ctypes.data + 63) // 64 * 64
+        p, c = (self.memory.take(code, name, np.zeros(max(1, count))) for name, count in (("p", self.n_p),
+                                                                                          ("c", unit.metadata.n_c)))
+        problem = Problem(p.ctypes.data, c.ctypes.data, self.inputs.ctypes.data)
+        code.problem = ctypes.addressof(problem)
+        self.problems.append(problem)
+        keep += [code, memory, problem, unit]
+        return ctypes.c_void_p(ctypes.addressof(code))
+
+    def start(self, request: Request, constants: Laws, same: float) -> None:
+        """Begin a run."""
+        record = self.record
+        self._attach()
+        for problem in self.problems:
+            problem.project, problem.length = int(request.stabilization.way == "projection"), request.stabilization.length
+        self.p[:self.n_p], self.atol[:] = request.p, request.atol
+        self.inputs[:len(request.inputs.constant)] = request.inputs.constant
+        record.begin, record.end = request.span
+        record.rtol, record.first_step, record.max_step = request.rtol, request.first_step, request.max_step
+        record.spacing, record.same = request.event_spacing, same
+        for name, value in constants._asdict().items():
+            setattr(record, name, value)
+
+    def _attach(self) -> None:
+        """Take the code of phases that was compiled by now: nothing is compiled for what may never come."""
+        for name, field in zip(("open", "closed"), self.fields, strict=True):
+            if not getattr(self.record, name) and self.module.has(field):
+                unit: Any = self.module.unit(field)
+                setattr(self.record, name, self._phase_code(unit))
+
+    def go(self, times: np.ndarray) -> Done:
+        """Go on from the state in the record, writing states at times; the record has the state that it ends with."""
+        record = self.record
+        out = np.empty((len(times), self.n_x))
+        record.times, record.out, record.n_times = times.ctypes.data, out.ctypes.data, len(times)
+        record.n_written = record.n_phases = record.n_impacts = 0
+        for name in ("n_steps", "n_rejected", "n_evaluations", "n_corrected", "n_corrections", "n_jacobians", "n_factorizations"):
+            setattr(record, name, 0)
+        record.largest_dq = record.largest_du = 0.0
+        begun = clock.perf_counter()
+        code = self.library.symdyn_hybrid_go(ctypes.byref(record))
+        seconds = clock.perf_counter() - begun
+        n, n_written, n_happened, n_impacts = record.n_phases, record.n_written, record.n_happened, record.n_impacts
+        t, x = times[:n_written], out[:n_written]
+        outcome = Outcome(
+            t, x, True, "reached the end", False, record.n_steps, record.n_rejected, record.n_evaluations, seconds,
+            Corrections(record.largest_dq, record.largest_du, record.n_corrected, record.n_corrections),
+            n_jacobians=record.n_jacobians, n_factorizations=record.n_factorizations, next_step=record.next_step)
+        return Done(
+            int(code), self.begin[:n].tolist(), self.end[:n].tolist(), self.phase_p[:n].copy(), self.phase_mode[:n].tolist(),
+            self.written[:n].tolist(), self.happened_by[:n].tolist(), self.impacts_by[:n].tolist(), t, x,
+            self.happened[:n_happened].tolist(), self.happened_t[:n_happened].tolist(), self.happened_states[:n_happened].copy(),
+            self.impact_t[:n_impacts].tolist(), self.impact[:n_impacts].copy(), outcome)

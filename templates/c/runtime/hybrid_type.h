@@ -1,0 +1,55 @@
+// A motion with rigid contacts that goes from phase to phase in C, see hybrid.h. All frames read the same t, x, inputs and p.
+#pragma once
+
+typedef struct {
+    // The mechanism. Of every contact: its first row, their number, places in p of what says that it is closed, that it sticks,
+    // the sign of its slip, and the events that end its modes: closes, opens, sticks, slips, ignored, counts; -1: there is none.
+    int n_q, n_u, n_state, n_x, n_p, n_contacts, n_rows, n_events;  // n_x: with the work of the loads
+    const int *first, *rows, *closed_at, *sticking_at, *sliding_at, *event;
+    int shared_at;  // place in p of the softness of rows that depend on each other
+
+    void *open, *closed;  // the code of phases in which all contacts are open, and of all others; none: not made so far
+    int (*contacts)(void *frame);
+    void *contacts_frame;
+    const double *of_contacts;  // see Numbers in symdyn/runtime/integrating/contacts.py
+    int (*contacts_prologue)(const double *p, double *c);
+    double *contacts_c;
+    int n_contacts_c;
+    int (*events)(void *frame);  // none: no contact is ever ignored
+    void *events_frame;
+    const double *of_events;
+    int (*events_prologue)(const double *p, double *c);
+    double *events_c;
+    int n_events_c;
+    double *t_now, *x_now, *p;  // what frames read
+
+    // The run, and the constants of its laws.
+    double begin, end, same, rtol, first_step, max_step, spacing;
+    const double *atol;
+    long most_steps;  // attempted, of one phase, and of one call
+    double touching, together, missed, no_speed, noise, dependent, different, energy, shortest_flight, lowest_flight, far;
+
+    // Where it is: before a switch, if it begins or events have fired, else before a phase.
+    double t, size;
+    double *x;
+    int begins, n_fired;
+    int *fired;                  // events, places of the module's
+    int *mode, *still, *passed;  // of every contact; whether it does not slip; whether it is ignored while open
+    double *sign;                // of its slip, 0: none
+    int *old_mode, *old_still, *old_passed, *ruled_out, *look, *leaves;
+    double *old_sign, *old_x, *rows_of_events, *states;
+
+    // What it has done. Output times with states; phases with their begin, end, parameters, modes, and how many output times,
+    // events and impacts there are by their end; events and impacts.
+    double *times, *out;
+    long n_times, n_written;
+    long n_phases, most_phases, n_happened, most_happened, n_impacts, most_impacts;
+    double *phase_begin, *phase_end, *phase_p;
+    int *phase_mode;
+    long *phase_written, *phase_happened, *phase_impacts;
+    int *happened;
+    double *happened_t, *happened_states;  // states before and after it
+    double *impact_t, *impact;             // impulses, velocities before and after it
+    long n_steps, n_rejected, n_evaluations, n_corrected, n_corrections, n_jacobians, n_factorizations;
+    double largest_dq, largest_du, next_step;
+} symdyn_hybrid;

@@ -1,0 +1,156 @@
+"""Motions with rigid contacts that are made in C, against the same laws in Python."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.runtime import contact_laws as laws
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.building.shared import shared
+from symdyn.runtime.contact_laws import Site
+from symdyn.runtime.integrating import contacts, hybrid
+from tests.derivatives.test_periodic_contacts import after_heel_strike, walker
+from tests.runtime.test_rigid_contact import G, ball, planar
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str], np.ndarray, np.ndarray]:
+    """What C finds, and modes, forces and accelerations."""
+    n, rows = len(sites), np.array([len(site.rows) for site in sites], dtype=np.intc)
+    excluded = np.array([sum(1 << hybrid.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
+    coefficients = np.array([[s.static, s.kinetic, 0.0 if s.slip is None or not len(s.slip) else s.slip[0]] for s in sites])
+    mode, answer = np.zeros(n, dtype=np.intc), np.zeros(n + 2 * len(b))
+    tolerances = np.array([laws.NOISE, laws.DEPENDENT, laws.DIFFERENT])
+    arrays = [rows, excluded, coefficients, np.ascontiguousarray(D), b, tolerances, mode, answer]
+    library = shared("hybrid", require_compiler())
+    found = library.symdyn_hybrid_modes(n, *[ctypes.c_void_p(a.ctypes.data) for a in arrays])
+    return found, [hybrid.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_modes_are_those_of_all_combinations(n: int) -> None:
+    """Random problems with and without friction, slips and modes that are ruled out."""
+    stream, counts = np.random.default_rng(n), dict.fromkeys((-1, 0, 1), 0)
+    for _ in range(300):
+        sites: list[Site] = []
+        first = 0
+        for _ in range(n):
+            rows = tuple(range(first, first + int(stream.integers(1, 3))))
+            first += len(rows)
+            kinetic = float(stream.uniform(0, 1))
+            static = kinetic * float(stream.choice([1.0, 1.5]))
+            slip = np.array([float(stream.choice([-1.0, 1.0]))])[:len(rows) - 1] if stream.uniform() < 0.4 else None
+            ruled = ((), (laws.STICKING,), (laws.STICKING, laws.SLIDING))[stream.choice(3, p=[0.8, 0.1, 0.1])]
+            sites.append(Site(rows, static, kinetic, slip, excluded=ruled))
+        root = stream.normal(size=(first, first + 1))
+        D, b = root @ root.T, stream.normal(size=first)
+        found, modes, lam, w = in_c(D, b, sites)
+        expected = laws.solutions(D, b, sites)
+        counts[found] += 1
+        if found == 1:
+            assert len(expected) == 1 and modes == [mode.kind for mode in expected[0].modes]
+            assert np.abs(lam - expected[0].lam).max() < 1e-9 * (1 + np.abs(lam).max())
+            assert np.abs(w - expected[0].w).max() < 1e-9 * (1 + np.abs(b).max())
+        elif found == 0:
+            assert not expected
+        else:
+            assert len(expected) > 1
+    assert counts[1] > 150 and counts[-1] > 0
+
+
+def test_rows_that_depend_on_each_other_are_left_to_python() -> None:
+    assert in_c(np.ones((2, 2)), np.array([-1.0, -1.0]), [Site((0,), 0, 0), Site((1,), 0, 0)])[0] == -1
+
+
+def box() -> Any:
+    contact = sd.Contact("corner", "body", "ground", shape=sd.contacts.Box([0.4, 0.2]), friction=(0.4, 0.3), restitution=0.6)
+    return planar("tumbling_box", [contact], 2.0, 2.0 * (0.4**2 + 0.2**2) / 12).compile()
+
+
+def closing_walls() -> Any:
+    """A ball between two walls, of which one comes nearer at 0.5 m/s."""
+    x, y = sd.coordinates("x y")
+    system = sd.System("walls", gravity=[0, -G])
+    wall, carrier, body = (system.add_body(name, mass=1.0) for name in ("wall", "carrier", "ball"))
+    system.add_joint(sd.Prismatic("drive", system.ground, wall, axis=[1, 0], coordinate=2 - sd.t / 2))
+    system.add_joint(sd.Prismatic("along", system.ground, carrier, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("across", carrier, body, axis=[0, 1], coordinate=y))
+    for name, other, normal in (("fixed", system.ground, [1, 0]), ("coming", wall, [-1, 0])):
+        system.add_contact(sd.Contact(name, body, other, shape=(sd.contacts.Point(), sd.contacts.Plane(normal)), restitution=1))
+    return system.compile()
+
+
+def hopper() -> Any:
+    """A mass on a leg with a spring, whose foot sticks, and whose joint has stops."""
+    length, angle, x, y = sd.coordinates("length angle x y")
+    system = sd.System("hopper", gravity=[0, -G])
+    carrier, hip, leg, foot = (system.add_body(name, mass=m, inertia=0.1 * m) for name, m in (
+        ("carrier", 0.0), ("hip", 5.0), ("leg", 0.5), ("foot", 0.2)))
+    system.add_joint(sd.Prismatic("along", system.ground, carrier, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("up", carrier, hip, axis=[0, 1], coordinate=y))
+    system.add_joint(sd.Revolute("swing", hip, leg, coordinate=angle))
+    system.add_joint(sd.Prismatic("stroke", leg, foot, axis=[0, -1], coordinate=length))
+    system.add_joint_force("swing", -2 * angle - angle.dot / 10)
+    system.add_joint_force("stroke", -400 * (length - 1) - 5 * length.dot)
+    system.add_contact(sd.Contact("toe", foot, system.ground, shape=sd.contacts.Point(), friction=0.9))
+    system.add_contact(sd.Stop("stop", "swing", -0.2, 0.2, restitution=0.5))
+    return system.compile()
+
+
+CASES: dict[str, tuple[Any, tuple[float, float], dict[str, Any], int]] = {
+    "ball": (lambda: ball(restitution=0.8).compile(), (0, 3), {"q": [0.5]}, 60),
+    "walker": (walker, (0, 30), dict(zip("qu", after_heel_strike(0.20031090, -0.19983247), strict=True)), 9),
+    "box": (box, (0, 1.2), {"q": [0, 0.6, 0.3], "u": [1.0, 0, 3.0]}, 4),
+    "walls": (closing_walls, (0, 3.5), {"q": [1.0, 0.0], "u": [0.7, 0.0]}, 5),
+    "hopper": (hopper, (0, 2), {"q": {"y": 1.2, "length": 1.0, "angle": 0.1}}, 4),
+}
+
+
+def counted(step: Any, what: str, tried: list[str]) -> Any:
+    """A method that notes its calls."""
+    def noted(*given: Any) -> Any:
+        tried.append(what)
+        return step(*given)
+    return noted
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+@pytest.mark.filterwarnings("ignore:hopper.* on the border of two modes:symdyn.errors.SimulationWarning")
+def test_motions_are_those_with_every_switch_in_python(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, span, start, n = CASES[name]
+    module, tried = make(), []
+    for owner, what in ((hybrid.Motion, "go"), (contacts._Phases, "_switch")):
+        monkeypatch.setattr(owner, what, counted(getattr(owner, what), what, tried))
+    module.simulate(span, **start, method=method, rtol=1e-11)  # which compiles the modes that it comes to
+    tried.clear()
+    quick = module.simulate(span, **start, method=method, rtol=1e-11, work=True)
+    quickly = tried.copy()
+    tried.clear()
+    monkeypatch.setattr(hybrid, "of", lambda *given: None)
+    slow = module.simulate(span, **start, method=method, rtol=1e-11, work=True)
+    assert "go" not in tried and tried.count("_switch") > n
+    assert "go" in quickly and quickly.count("_switch") < tried.count("_switch") / 2
+    assert quick.success and slow.success and np.array_equal(quick.t, slow.t)
+    assert quick.n_steps == pytest.approx(slow.n_steps, rel=0.05)
+    size = np.abs(slow.x).max()
+    off = np.abs(quick.x - slow.x).max(axis=1)
+    assert np.quantile(off, 0.98) < 1e-7 * size  # at output times next to impacts one run may be before, one behind them
+    for contact, one in quick.contacts.items():
+        two = slow.contacts[contact]
+        assert [mode for _, mode in one.switches] == [mode for _, mode in two.switches]
+        assert np.abs(np.array([t for t, _ in one.switches]) - [t for t, _ in two.switches]).max(initial=0.0) < 1e-7
+        assert len(one.impacts.t) == len(two.impacts.t)
+        assert np.abs(one.impacts.t - two.impacts.t).max(initial=0.0) < 1e-7
+        assert np.abs(one.impacts.impulse - two.impacts.impulse).max(initial=0.0) < 1e-6 * size
+        assert np.array_equal(one.mode[off < 1e-7 * size], two.mode[off < 1e-7 * size])
+    for event, one in quick.events.items():
+        assert len(one.t) == len(slow.events[event].t)
+    assert len(quick.doubts) == len(slow.doubts)
+    assert np.abs(quick.energy_balance["error"]).max() < 1e-6
