@@ -17,7 +17,7 @@ from symdyn.formulation.constraints.augmented import augment
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.formulation.trees.recursive import recursive
-from symdyn.functions.tapes import function_tape
+from symdyn.functions.content import with_open_contacts
 from symdyn.kinds import flag
 from symdyn.model.record import Model, joint_speeds
 from symdyn.shown import shown
@@ -159,8 +159,8 @@ class Derived:
 
     @classmethod
     def of(cls, equations: MotionEquations) -> Derived:
-        """Count and predict; terms as in `terms`."""
-        tape = function_tape(equations, "rhs")
+        """Count and predict; terms as in `terms`. Rigid contacts are open: a motion pays nothing for those that stay so."""
+        tape = with_open_contacts(equations, "rhs")
         run = schedule(tape)
         return cls(equations, tape, run, time_of(terms(tape, run)))
 

@@ -27,7 +27,7 @@ from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unkn
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.sensitivities import column_names, held_names
 from symdyn.functions.table import FUNCTIONS, title_of
-from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
+from symdyn.functions.tapes import given_rates, has_function, switches, tape_as_derived, tapes_of
 from symdyn.model.symbols import GivenMotion
 from symdyn.shown import name_of
 from symdyn.tape.balance import balance
@@ -133,6 +133,12 @@ def _group_records(equations: Equations) -> tuple[GroupRecord, ...]:
     places = {u: k for k, u in enumerate(equations.symbols.speeds)}
     return tuple(GroupRecord(g.name, tuple(s.body for s in g.spheres), tuple(places[u] for s in g.spheres for u in s.speeds),
                              len(g.planes)) for g in equations.contact_groups)
+
+
+def with_open_contacts(equations: Equations, name: str) -> Tape:
+    """The tape behind a function of a module, as it is emitted where all rigid contacts are open."""
+    tape = tape_as_derived(equations, name)
+    return balance(specialize(tape, dict.fromkeys(closed_names(equations), 0.0)) if equations.contacts else tape)
 
 
 def closed_names(equations: Equations) -> list[str]:

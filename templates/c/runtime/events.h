@@ -589,12 +589,28 @@ static int symdyn_event_safe(symdyn_run *run, const double *range) {
     return 1;
 }
 
+// Take away the ends of the ranges of leaves that nothing depends on which is looked for, or only periodically: as those of
+// velocities, and of angles below which contacts are far away.
+__attribute__((noinline)) static void symdyn_event_unlimited(symdyn_run *run) {
+    double *const safe = run->events.safe;
+    run->events.n_limited = 0;
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        const double from = safe[2 * l], to = safe[2 * l + 1];
+        safe[2 * l] = -1e100;
+        safe[2 * l + 1] = 1e100;
+        if (symdyn_event_safe(run, safe)) continue;
+        safe[2 * l] = from;
+        safe[2 * l + 1] = to;
+        run->events.limited[run->events.n_limited++] = l;
+    }
+}
+
 // Ranges around those of a step in which all that is looked for is safe, as wide as they can be by powers of two. Returns whether
 // there are any.
 __attribute__((noinline)) static int symdyn_event_widened(symdyn_run *run, const double *range) {
     double wider[2 * SYMDYN_LEAVES];
-    int inside = 0;
-    for (int power = run->events.widened + 4; !inside && power >= 0; power--) {
+    int inside = 0, power = run->events.widened + 4;
+    for (; !inside && power >= 0; power--) {
         const double factor = power ? (double)(1L << power) : 0.0;
         for (int l = 0; l < SYMDYN_LEAVES; l++) {
             const double more = factor * (range[2 * l + 1] - range[2 * l]);
@@ -604,35 +620,49 @@ __attribute__((noinline)) static int symdyn_event_widened(symdyn_run *run, const
         inside = symdyn_event_safe(run, wider);
         run->events.widened = inside ? (power < 26 ? power : 26) : 0;
     }
-    for (int l = 0; l < 2 * SYMDYN_LEAVES; l++) run->events.safe[l] = inside ? wider[l] : l % 2 ? -1.0 : 1.0;
+    run->events.ranged = inside;
+    for (int l = 0; l < 2 * SYMDYN_LEAVES; l++) run->events.safe[l] = wider[l];
+    for (int l = 0; l < SYMDYN_LEAVES; l++) run->events.limited[l] = l;
+    run->events.n_limited = SYMDYN_LEAVES;
+    // Far away, at the first time, the second, the fourth, ...
+    if (inside && run->events.widened >= 8 && !(++run->events.n_widened & (run->events.n_widened - 1)))
+        symdyn_event_unlimited(run);
     return inside;
 }
 
-// Whether nothing that is looked for can vanish in the latest step, so that there is nothing to search. What it depends on moves
-// no further than twice as far as by the slopes of stages throughout the step; as long as it stays within ranges that were found
-// to be safe, this costs a few comparisons.
+// The range of a leaf throughout the latest step, no further than twice as far as by the slopes of stages.
+static inline void symdyn_event_range(const symdyn_run *run, int l, double *range) {
+    const int place = symdyn_event_leaf[l];
+    double least = 0.0, most = 0.0;
+    if (!place) {
+        range[0] = run->direction > 0.0 ? run->t_old : run->t;
+        range[1] = run->direction > 0.0 ? run->t : run->t_old;
+        return;
+    }
+    for (int j = 0; j <= 4; j++) {
+        const double slope = j < 4 ? run->method.k[j * SYMDYN_STAGES / 4][place - 1] : run->xd[place - 1];
+        least = slope < least ? slope : least;
+        most = slope > most ? slope : most;
+    }
+    const double from = 2.0 * run->h_old * least, to = 2.0 * run->h_old * most, x = run->x_old[place - 1];
+    range[0] = x + (from < to ? from : to);
+    range[1] = x + (from < to ? to : from);
+}
+
+// Whether nothing that is looked for can vanish in the latest step, so that there is nothing to search. As long as what it
+// depends on stays within ranges that were found to be safe, this costs a few comparisons.
 __attribute__((noinline)) static int symdyn_event_far(symdyn_run *run) {
     double range[2 * SYMDYN_LEAVES];
-    int inside = 1;
-    for (int l = 0; l < SYMDYN_LEAVES; l++) {
-        const int place = symdyn_event_leaf[l];
-        double least = 0.0, most = 0.0;
-        if (place) {
-            for (int j = 0; j <= 4; j++) {
-                const double slope = j < 4 ? run->method.k[j * SYMDYN_STAGES / 4][place - 1] : run->xd[place - 1];
-                least = slope < least ? slope : least;
-                most = slope > most ? slope : most;
-            }
-            const double from = 2.0 * run->h_old * least, to = 2.0 * run->h_old * most, x = run->x_old[place - 1];
-            range[2 * l] = x + (from < to ? from : to);
-            range[2 * l + 1] = x + (from < to ? to : from);
-        } else {
-            range[0] = run->direction > 0.0 ? run->t_old : run->t;
-            range[1] = run->direction > 0.0 ? run->t : run->t_old;
-        }
-        inside &= range[2 * l] >= run->events.safe[2 * l] && range[2 * l + 1] <= run->events.safe[2 * l + 1];
+    int inside = run->events.ranged;
+    for (int i = 0; inside && i < run->events.n_limited; i++) {
+        const int l = run->events.limited[i];
+        symdyn_event_range(run, l, range);
+        inside = range[0] >= run->events.safe[2 * l] && range[1] <= run->events.safe[2 * l + 1];
     }
-    inside = inside || symdyn_event_widened(run, range);
+    if (!inside) {
+        for (int l = 0; l < SYMDYN_LEAVES; l++) symdyn_event_range(run, l, range + 2 * l);
+        inside = symdyn_event_widened(run, range);
+    }
     run->events.stale |= inside;
     return inside;
 }

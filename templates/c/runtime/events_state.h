@@ -15,6 +15,8 @@ typedef struct {
 #if SYMDYN_HAS_BOUNDS
     double safe[2 * SYMDYN_LEAVES];  // ranges of what the quantities depend on, in which none that is looked for vanishes
     int widened, stale;              // by powers of two; values at the start of what is searched next are of an earlier time
+    int ranged, n_limited, limited[SYMDYN_LEAVES];  // whether these ranges are known; leaves whose ranges have ends
+    long n_widened;                                 // how often they were found to be wide
 #endif
     double spacing;              // of samples at the most, s; 0: any
     double t, after[SYMDYN_NX];  // of the latest reset; the state after it
