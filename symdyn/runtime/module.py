@@ -1179,11 +1179,10 @@ class Module:
 
     def remembered(self, name: str, make: Callable[[], Any]) -> Any:
         """What was made for this thread under a name, made now if it was not."""
-        known = getattr(self._local, name, None)
-        if known is None:
-            known = make()
-            setattr(self._local, name, known)
-        return known
+        kept = self._local.__dict__
+        if name not in kept:
+            kept[name] = make()
+        return kept[name]
 
     def _unit(self, what: str | RightSide) -> Unit:
         what = RightSide() if what == "rhs" else what

@@ -57,6 +57,7 @@ SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Energy that an impact adds counts from this part of its work on.
 GAINED = 1e-9
+CODE_OF = {mode: k for k, mode in enumerate(MODES)}
 LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWEST_FLIGHT)
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
@@ -89,9 +90,25 @@ def rows_of(records: Sequence[ContactRecord]) -> list[tuple[int, ...]]:
     return [tuple(range(a, b)) for a, b in pairwise(ends.tolist())]
 
 
+class _Evaluated:
+    """The function "contacts" of a module, for one thread, with the parameters that it had last."""
+
+    def __init__(self, module: Module) -> None:
+        self.evaluator, self.p = module.unit(CONTACTS).evaluator(CONTACTS), b""
+
+    def __call__(self, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> np.ndarray:
+        mark = p.tobytes()
+        if mark != self.p:
+            self.evaluator.set_params(p)
+            self.p = mark
+        found: np.ndarray = self.evaluator.one(t, x, inputs)
+        return found
+
+
 def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
     """What the laws of contact take at a state."""
-    return _numbers_of(module.metadata, module.evaluate(CONTACTS, t, x[:module.metadata.sizes.x], p, inputs))
+    known: _Evaluated = module.remembered("contact_numbers", lambda: _Evaluated(module))
+    return _numbers_of(module.metadata, known(t, x[:module.metadata.sizes.x], p, inputs))
 
 
 def _numbers_of(metadata: ModuleMetadata, values: np.ndarray) -> Numbers:
@@ -107,6 +124,9 @@ def _numbers_of(metadata: ModuleMetadata, values: np.ndarray) -> Numbers:
 
 def _check_coefficients(module: Module, at: Numbers, p: np.ndarray) -> None:
     """Raise ArgumentError for friction, restitution and lengths that cannot be, as `params` may give them."""
+    regular = at.kinetic.min() >= 0 <= at.restitution.min() and at.restitution.max() <= 1 and (at.static >= at.kinetic).all()
+    if regular and not any(record.lengths for record in module.metadata.contacts):
+        return
     values = dict(zip(module.metadata.parameters, p, strict=False))
     lengths = {name: record.contact for record in module.metadata.contacts for name in record.lengths}
     faults = [f"{name}, a length of contact {contact}, is {values[name]:g}; pass a number that is not negative"
@@ -174,6 +194,8 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     that parameters make impossible."""
     at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
     _check_coefficients(module, at, p)
+    if at.gap.min(initial=0.0) >= -TOUCHING:
+        return
     passed = ignored(module, t, x, p, inputs)
     counts = [record.kind != CLUTCH and not other for record, other in zip(records, passed, strict=True)]
     deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and counts[k]]
@@ -257,6 +279,31 @@ class _Doubt:
                 f"{self.until:.9g} s, at contacts {', '.join(self.names)}")
 
 
+class _Table:
+    """What a module says of its contacts: places of their rows, parameters and events.
+
+    Raises ArgumentError where parameters that say in which mode contacts are have become numbers.
+    """
+
+    def __init__(self, module: Module) -> None:
+        metadata = module.metadata
+        self.records = metadata.contacts
+        self.rows = rows_of(self.records)
+        self.normal = [rows[0] for rows in self.rows]  # of dry friction its only row
+        self.tangents = [list(rows[record.normal:]) for rows, record in zip(self.rows, self.records, strict=True)]
+        self.clutches = [k for k, record in enumerate(self.records) if record.kind == CLUTCH]
+        self.placed = [k for k, record in enumerate(self.records) if record.normal and record.kind != CLUTCH]  # by positions
+        self.frictions = [k for k, record in enumerate(self.records) if not record.normal]
+        self.place = {name: k for k, name in enumerate(metadata.parameters)}
+        missing = [name for record in self.records for name in record.parameters if name not in self.place]
+        if missing:
+            raise ArgumentError(f"{module.name}: the parameters {', '.join(missing)} say in which mode contacts are, and a "
+                                "run sets them; leave them out of specialize")
+        events = {event.name: k for k, event in enumerate(metadata.events)}
+        self.events = [{what: events[f"{record.name}_{what}"] for what in record.events} for record in self.records]
+        self.of_event = {k: (j, what) for j, own in enumerate(self.events) for what, k in own.items()}
+
+
 @dataclass
 class _Phases:
     module: Module
@@ -275,24 +322,11 @@ class _Phases:
     quick: Motion | None = None
 
     def __post_init__(self) -> None:
-        metadata = self.module.metadata
-        self.records = metadata.contacts
-        self.rows = rows_of(self.records)
-        self.normal = [rows[0] for rows in self.rows]  # of dry friction its only row
-        self.tangents = [list(rows[record.normal:]) for rows, record in zip(self.rows, self.records, strict=True)]
-        self.clutches = [k for k, record in enumerate(self.records) if record.kind == CLUTCH]
-        self.placed = [k for k, record in enumerate(self.records) if record.normal and record.kind != CLUTCH]  # by positions
-        self.frictions = [k for k, record in enumerate(self.records) if not record.normal]
+        table: _Table = self.module.remembered("contact_table", lambda: _Table(self.module))
+        self.records, self.rows, self.normal, self.tangents = table.records, table.rows, table.normal, table.tangents
+        self.clutches, self.placed, self.frictions = table.clutches, table.placed, table.frictions
+        self.place, self.events, self.of_event = table.place, table.events, table.of_event
         self.n_steps = 0
-        place = {name: k for k, name in enumerate(metadata.parameters)}
-        missing = [name for record in self.records for name in record.parameters if name not in place]
-        if missing:
-            raise ArgumentError(f"{self.module.name}: the parameters {', '.join(missing)} say in which mode contacts are, and a "
-                                "run sets them; leave them out of specialize")
-        self.place = place
-        events = {event.name: k for k, event in enumerate(metadata.events)}
-        self.events = [{what: events[f"{record.name}_{what}"] for what in record.events} for record in self.records]
-        self.of_event = {k: (j, what) for j, own in enumerate(self.events) for what, k in own.items()}
         n = len(self.records)
         self.modes = [OPEN] * n
         self.directions = [np.zeros(record.tangents) for record in self.records]
@@ -391,9 +425,8 @@ class _Phases:
         record.t, record.size, record.begins, record.n_fired = self.t, self.size, self.begun, len(self.fired)
         quick.x[:] = self.x
         quick.fired[:len(self.fired)] = [self.events[k][what] for k, what in self.fired]
-        quick.mode[:] = [MODES.index(mode) for mode in self.modes]
-        quick.still[:], quick.passed[:] = self.still, self.passed
-        quick.sign[:] = [direction.sum() for direction in self.directions]
+        quick.mode[:], quick.still[:], quick.passed[:] = [CODE_OF[mode] for mode in self.modes], self.still, self.passed
+        quick.sign[:] = [direction[0] if len(direction) else 0.0 for direction in self.directions]
         latest = []
         while self.fired and self.happened and self.happened[-1].t == self.t:
             latest.append(self.happened.pop())
@@ -431,7 +464,9 @@ class _Phases:
         self.fired = [self.of_event[k] for k in quick.fired[:record.n_fired].tolist()]
         self.modes = [MODES[mode] for mode in quick.mode.tolist()]
         self.still, self.passed = list(map(bool, quick.still.tolist())), list(map(bool, quick.passed.tolist()))
-        self.directions = [np.full(record.tangents, sign) for record, sign in zip(self.records, quick.sign.tolist(), strict=True)]
+        for k, sign in enumerate(quick.sign.tolist()):
+            if len(self.directions[k]) and self.directions[k][0] != sign:
+                self.directions[k] = np.full(self.records[k].tangents, sign)
         return done.code
 
     def _demand_seen(self, t: float, x: np.ndarray, passed: float) -> None:
@@ -969,8 +1004,9 @@ class _Phases:
     def _whole(self, t: float, x: np.ndarray, message: str, cause: BaseException | None, interrupted: bool,
                over: bool) -> Outcome:
         width = len(self.request.x0)
-        times = np.concatenate(self.ts) if self.ts else np.array(self.request.span[:1])
-        states = np.concatenate(self.xs) if self.xs else self.request.x0[None, :].copy()
+        times, states = np.array(self.request.span[:1]), self.request.x0[None, :].copy()
+        if self.ts:
+            times, states = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in (self.ts, self.xs))
         phase_of = np.repeat(np.arange(len(self.ts)), [len(one) for one in self.ts])
         notes: dict[str, Any] = {"phases": tuple(self.phases), "impacts": tuple(self.impacts)}
         happened = sorted(self.happened, key=lambda one: one.t)
@@ -980,6 +1016,5 @@ class _Phases:
         if message and not over and (not len(times) or t > times[-1]):
             times, states = np.append(times, t), np.vstack([states, x])
             phase_of = np.append(phase_of, len(self.ts) - 1)
-        whole = of_pieces(self.done, times, states, self.n_steps, message, cause, interrupted, over)
-        doubts = (*map(str, self.doubts.values()), *whole.doubts)
-        return replace(whole, happened=happened, doubts=doubts, row_phases=phase_of, **notes)
+        return of_pieces(self.done, times, states, self.n_steps, message, cause, interrupted, over, happened=happened,
+                         doubts=tuple(map(str, self.doubts.values())), row_phases=phase_of, **notes)

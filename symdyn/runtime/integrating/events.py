@@ -57,9 +57,9 @@ def wanted(module: Module, asked: Any) -> np.ndarray:
 
     Raises ArgumentError for names that the mechanism has no event of.
     """
-    names = [e.name for e in module.metadata.events]
     if isinstance(asked, (bool, np.bool_)) or asked is None:
-        return np.full(len(names), asked is None or bool(asked))
+        return np.full(len(module.metadata.events), asked is None or bool(asked))
+    names = [e.name for e in module.metadata.events]
     chosen = [name_of(a) for a in ([asked] if isinstance(asked, str) or not isinstance(asked, Iterable) else asked)]
     strange = [a for a in chosen if a not in names]
     if strange:
@@ -71,12 +71,12 @@ def wanted(module: Module, asked: Any) -> np.ndarray:
 
 def rows_of(module: Module, happened: Sequence[Happened], n_x: int) -> dict[str, EventRows]:
     """Times and states by event."""
-    rows = {}
-    for k, event in enumerate(module.metadata.events):
-        own = [one for one in happened if one.event == k]
-        states = np.array([one.before[:n_x] for one in own]).reshape(len(own), n_x)
-        rows[event.name] = EventRows(np.array([one.t for one in own]), states)
-    return rows
+    own: list[list[Happened]] = [[] for _ in module.metadata.events]
+    for one in happened:
+        own[one.event].append(one)
+    none = EventRows(np.zeros(0), np.zeros((0, n_x)))
+    return {event.name: EventRows(np.array([one.t for one in rows]), np.array([one.before[:n_x] for one in rows])) if rows
+            else none for event, rows in zip(module.metadata.events, own, strict=True)}
 
 
 def ended(module: Module, k: int, t: float) -> str:
@@ -138,7 +138,7 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
     """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, the
     inputs that are given by functions, and those that are not enclosed; "" where none does, and where the user has chosen the
     spacing of samples."""
-    if look is None or spacing:
+    if look is None or spacing or not look.any():
         return ""
     parts = []
     for record, wanted in zip(module.metadata.events, look, strict=True):

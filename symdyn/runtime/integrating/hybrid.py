@@ -98,17 +98,21 @@ class Done(NamedTuple):
 
 def of(module: Module, request: Request, method: object) -> Motion | None:
     """What makes motions like this one in C; None where nothing of it could be made there."""
-    metadata, inputs = module.metadata, request.inputs
+    inputs = request.inputs
     varies = inputs.function is not None or inputs.pieces is not None or inputs.motions is not None or inputs.are_held
     if (method not in METHODS or varies or len(inputs.kinks) or request.columns or request.times is None or request.step
-            or request.max_steps is not None or request.stabilization.way == "baumgarte" or metadata.switches
+            or request.max_steps is not None or request.stabilization.way == "baumgarte"
             or (request.look is not None and request.look.any())):
         return None
-    if not all(_is_plain(record, metadata.parameters) for record in metadata.contacts) or find_compiler() is None:
-        return None
     method = str(method)
-    motion: Motion = module.remembered(f"hybrid_{method}_{request.works}", lambda: Motion(module, method, request.works))
+    motion: Motion | None = module.remembered(f"hybrid_{method}_{request.works}", lambda: _motion(module, method, request.works))
     return motion
+
+
+def _motion(module: Module, method: str, works: bool) -> Motion | None:
+    metadata = module.metadata
+    plain = not metadata.switches and all(_is_plain(record, metadata.parameters) for record in metadata.contacts)
+    return Motion(module, method, works) if plain and find_compiler() is not None else None
 
 
 def _is_plain(record: ContactRecord, parameters: Sequence[str]) -> bool:
@@ -167,6 +171,7 @@ class Motion:
         self.impact = take(record, "impact", np.zeros((MOST_PHASES, 3, n_rows)))
         self.inputs = np.zeros(max(1, sizes.inputs))
         self.problems: list[Problem] = []
+        self.constants: Laws | None = None
         self._functions()
 
     def _functions(self) -> None:
@@ -214,8 +219,10 @@ class Motion:
         record.begin, record.end = request.span
         record.rtol, record.first_step, record.max_step = request.rtol, request.first_step, request.max_step
         record.spacing, record.same = request.event_spacing, same
-        for name, value in constants._asdict().items():
-            setattr(record, name, value)
+        if constants != self.constants:
+            self.constants = constants
+            for name, value in constants._asdict().items():
+                setattr(record, name, value)
 
     def _attach(self) -> None:
         """Take the code of phases that was compiled by now: nothing is compiled for what may never come."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -160,21 +160,27 @@ class Outcome:
 
 
 def of_pieces(done: Sequence[Outcome], t: np.ndarray, x: np.ndarray, n_steps: int, message: str, cause: BaseException | None,
-              interrupted: bool, over: bool) -> Outcome:
+              interrupted: bool, over: bool, **more: Any) -> Outcome:
     """A motion that was integrated piece by piece, as one: counts are sums, what else there is that of the last piece.
 
-    message   why it ended, if not with the last piece; over: an event that stops ended it
+    message   why it ended, if not with the last piece; over: an event that stops ended it; more: further members
     """
-    last, corrections = done[-1], [o.corrections for o in done]
-    seconds = [o.seconds for o in done if o.seconds is not None]
+    last = done[-1]
+    if len(done) > 1:
+        corrections = [o.corrections for o in done]
+        seconds = [o.seconds for o in done if o.seconds is not None]
+        more |= {
+            "n_rejected": sum(o.n_rejected for o in done), "n_evaluations": sum(o.n_evaluations for o in done),
+            "seconds": sum(seconds) if seconds else None,
+            "corrections": Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
+                                       sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
+            "n_jacobians": sum(o.n_jacobians for o in done), "n_factorizations": sum(o.n_factorizations for o in done),
+            "doubts": (*more.get("doubts", ()), *next((o.doubts for o in done if o.doubts), ()))}
+    elif "doubts" in more:
+        more["doubts"] = (*more["doubts"], *last.doubts)
     return replace(
         last, t=t, x=x, success=last.success and (over or not message), message=message or last.message,
-        interrupted=interrupted or last.interrupted, n_steps=n_steps, n_rejected=sum(o.n_rejected for o in done),
-        n_evaluations=sum(o.n_evaluations for o in done), seconds=sum(seconds) if seconds else None,
-        corrections=Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
-                                sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
-        n_jacobians=sum(o.n_jacobians for o in done), n_factorizations=sum(o.n_factorizations for o in done),
-        doubts=next((o.doubts for o in done if o.doubts), ()), cause=cause or last.cause)
+        interrupted=interrupted or last.interrupted, n_steps=n_steps, cause=cause or last.cause, **more)
 
 
 def accumulations(outcome: Outcome, names: Sequence[str]) -> list[tuple[str, float, float]]:

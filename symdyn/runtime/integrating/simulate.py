@@ -44,6 +44,7 @@ from symdyn.runtime.solutions.validity import WATCHES, warn
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.backend.metadata import ModuleMetadata
     from symdyn.runtime.integrating.contact_columns import Switch
     from symdyn.runtime.module import Module
 
@@ -168,8 +169,14 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
 
 def looked_for(module: Module, events: Any) -> np.ndarray:
     """Events that are looked for all along, (n_e,) of bool: those of rigid contacts are as their modes say."""
-    own = {f"{c.name}_{what}" for c in module.metadata.contacts for what in c.events}
-    return wanted(module, events) & np.array([e.name not in own for e in module.metadata.events], dtype=bool)
+    own: np.ndarray = module.remembered("own_events", lambda: of_contacts(module.metadata))
+    return wanted(module, events) & ~own
+
+
+def of_contacts(metadata: ModuleMetadata) -> np.ndarray:
+    """Which events are those of rigid contacts, (n_e,) of bool."""
+    own = {f"{c.name}_{what}" for c in metadata.contacts for what in c.events}
+    return np.array([e.name in own for e in metadata.events], dtype=bool)
 
 
 def integrate(module: Module, request: Request, method: Any, bar: Any = None, crossed: list[Switch] | None = None) -> Outcome:
