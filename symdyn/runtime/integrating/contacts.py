@@ -442,22 +442,25 @@ class _Phases:
         if done.begin:
             self.done.append(done.outcome)
             self.n_steps += done.outcome.n_steps
-        starts = [0, *done.written[:-1]]
         impacts = [Impact(t, *rows) for t, rows in zip(done.impact_times, done.impacts, strict=True)]
         happened = [Happened(k, t, *both) for k, t, both in zip(done.events, done.event_times, done.event_states, strict=True)]
-        seen, hit = 0, 0
-        for k, (begin, end) in enumerate(zip(done.begin, done.end, strict=True)):
-            self.phases.append(Phase(begin, done.p[k], tuple([MODES[mode] for mode in done.modes[k]])))
-            self.ts.append(times[starts[k]:done.written[k]])
-            self.xs.append(states[starts[k]:done.written[k]])
-            ended = happened[seen:done.happened_by[k]]
-            self.impacts += impacts[hit:done.impacts_by[k]]
+        at, seen, hit = 0, 0, 0
+        fired: list[tuple[int, str]] = []
+        for begin, end, p, modes, written, happened_by, impacts_by in zip(
+                done.begin, done.end, done.p, done.modes, done.written, done.happened_by, done.impacts_by, strict=True):
+            self.phases.append(Phase(begin, p, tuple([MODES[mode] for mode in modes])))
+            self.ts.append(times[at:written])
+            self.xs.append(states[at:written])
+            ended = happened[seen:happened_by]
+            self.impacts += impacts[hit:impacts_by]
             self.happened += ended
-            seen, hit = done.happened_by[k], done.impacts_by[k]
+            at, seen, hit = written, happened_by, impacts_by
             fired = [self.of_event[one.event] for one in ended if one.t == end]
             if fired:
                 self.t, self.x = end, ended[-1].before
-                self._count(end - begin, end, fired)
+                self._recall(end, fired)
+        if fired and done.end[-1] - done.begin[-1] <= self.same:
+            self._at_once(self.t, fired)
         self.impacts += impacts[hit:]
         self.happened += happened[seen:]
         self.t, self.x, self.size, self.begun = record.t, quick.x.copy(), record.size, bool(record.begins)
@@ -483,23 +486,31 @@ class _Phases:
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note how often the modes change without time passing, and with less and less; raise _Stop where that does not end."""
         if fired:
-            self.recent.append((t, tuple(k for k, _ in fired)))
-            begin, end = self.request.span
-            if self.request.step and len(self.recent) >= MOST_FAST:
-                passed_by = t - self.recent[-MOST_FAST][0]
-                if passed_by < (MOST_FAST - 1) * self.request.step:
-                    raise TooFast(f"{MOST_FAST} switches of contacts until t = {t:.6g} s came within {passed_by:.3g} s, faster "
-                                  f"than one in a step of {self.request.step:g} s, so that steps go across them")
-            first = self.recent[0][0]
-            if len(self.recent) == MOST_SHORT and t - first < MOST_SHORT * SHORTEST_FLIGHT * (end - begin):
-                often = Counter(self.records[k].name for _, of in self.recent for k in of)
-                raise _Stop(f"the modes of contacts change {MOST_SHORT} times within {t - first:.3g} s, and nothing says when "
-                            f"that ends: {', '.join(f'{name} {n} times' for name, n in often.most_common())}; restitution below "
-                            "1, or a compliant contact where they touch, leaves fewer switches"
-                            + "; method='moreau' with a step goes across them" * (not not_stepped(self.records)))
+            self._recall(t, fired)
         if passed > self.same:
             self.at_once, self.ruled_out, self.unlooked, self.until = 0, {}, set(), np.inf
-            return
+        else:
+            self._at_once(t, fired)
+
+    def _recall(self, t: float, fired: Sequence[tuple[int, str]]) -> None:
+        """Note a switch; raise _Stop where those of late have been too many."""
+        self.recent.append((t, tuple([k for k, _ in fired])))
+        begin, end = self.request.span
+        if self.request.step and len(self.recent) >= MOST_FAST:
+            passed_by = t - self.recent[-MOST_FAST][0]
+            if passed_by < (MOST_FAST - 1) * self.request.step:
+                raise TooFast(f"{MOST_FAST} switches of contacts until t = {t:.6g} s came within {passed_by:.3g} s, faster "
+                              f"than one in a step of {self.request.step:g} s, so that steps go across them")
+        first = self.recent[0][0]
+        if len(self.recent) == MOST_SHORT and t - first < MOST_SHORT * SHORTEST_FLIGHT * (end - begin):
+            often = Counter(self.records[k].name for _, of in self.recent for k in of)
+            raise _Stop(f"the modes of contacts change {MOST_SHORT} times within {t - first:.3g} s, and nothing says when "
+                        f"that ends: {', '.join(f'{name} {n} times' for name, n in often.most_common())}; restitution below "
+                        "1, or a compliant contact where they touch, leaves fewer switches"
+                        + "; method='moreau' with a step goes across them" * (not not_stepped(self.records)))
+
+    def _at_once(self, t: float, fired: Sequence[tuple[int, str]]) -> None:
+        """Note a switch without time since the one before; raise _Stop where these do not end."""
         self.at_once += 1
         self.latest = ", ".join(dict.fromkeys(self.records[k].name for k, _ in fired)) or self.latest
         self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}

@@ -659,9 +659,11 @@ __attribute__((noinline)) static int symdyn_event_far(symdyn_run *run) {
         symdyn_event_range(run, l, range);
         inside = range[0] >= run->events.safe[2 * l] && range[1] <= run->events.safe[2 * l + 1];
     }
-    if (!inside) {
+    if (!inside && run->events.waits-- <= 0) {
         for (int l = 0; l < SYMDYN_LEAVES; l++) symdyn_event_range(run, l, range + 2 * l);
         inside = symdyn_event_widened(run, range);
+        run->events.wait = inside ? 0 : run->events.wait < 7 ? 2 * run->events.wait + 1 : 7;
+        run->events.waits = run->events.wait;
     }
     run->events.stale |= inside;
     return inside;

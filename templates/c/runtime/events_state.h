@@ -17,6 +17,7 @@ typedef struct {
     int widened, stale;              // by powers of two; values at the start of what is searched next are of an earlier time
     int ranged, n_limited, limited[SYMDYN_LEAVES];  // whether these ranges are known; leaves whose ranges have ends
     long n_widened;                                 // how often they were found to be wide
+    int waits, wait;                                // steps in which none are looked for, since there were none
 #endif
     double spacing;              // of samples at the most, s; 0: any
     double t, after[SYMDYN_NX];  // of the latest reset; the state after it
