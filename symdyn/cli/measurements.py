@@ -98,7 +98,7 @@ MEASUREMENTS: dict[str, Measurement] = {
             _folder("published"), Option("progress", "--progress", {"action": "store_true", "help": "show a bar (needs tqdm)"}))),
     "contacts": Measurement(
         "symdyn.lab.contacts:run", "contact by work against error: switches located and time stepping, MuJoCo, Exudyn", (
-            _names("--only", "names", "some of the motions: ball, oscillator, billiard"),
+            _names("--only", "names", "some of the motions ball, oscillator, billiard, and of the costs walker, open"),
             _number("--repeats", "repeats", "timed runs, of which the least time counts (default: 3)"), _folder("contacts"))),
     "growth": Measurement(
         "symdyn.lab.growth:run", "how everything grows with the number of bodies: table and picture", (

@@ -10,7 +10,7 @@ the largest one of the position over 31 times, by the size of the motion; work i
 of the model. MuJoCo and Exudyn have no rigid contact: where bodies touch they yield. Their ball yields so that an impact takes 5,
 20 or 80 steps, whichever gives the smallest error; friction of a joint is MuJoCo's frictionloss, in Exudyn friction over a zone
 of speeds that shrinks with the steps. A ball that slides on a plane is not built for Exudyn here. Siconos, which locates impacts
-as well, has no package that pip installs.
+as well, has no package that pip installs. What contacts cost besides: see symdyn.lab.contact_costs.
 
     symdyn bench contacts
 """
@@ -31,6 +31,7 @@ import numpy as np
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.lab.contact_costs import COSTS, Cost
 
 G = 9.81
 LOCATED, STEPPED, MUJOCO, EXUDYN = "symdyn, switches located", "symdyn, time stepping", "MuJoCo", "Exudyn"
@@ -314,9 +315,10 @@ def picture(points: Sequence[Point], path: Path) -> None:
 
 
 def run(names: Sequence[str] | None = None, repeats: int = 3, folder: Path | None = None) -> int:
-    """Measure the named motions (default: all), print a line of each run, and write table and picture into a folder; returns how
-    many runs of other programs are not met. Raises ArgumentError for motions that there are not."""
-    known = motions()
+    """Measure the named motions and costs (default: all), print a line of each run, and write table and picture into a folder;
+    returns how many runs of other programs are not met, and how many bounds of costs. Raises ArgumentError for names that there
+    are not."""
+    known: dict[str, Motion | None] = {**motions(), **dict.fromkeys(COSTS)}
     strange = [name for name in names or () if name not in known]
     if strange or repeats < 1:
         raise ArgumentError("; ".join([*[f"there is no motion {name!r}; pass some of {', '.join(known)}" for name in strange],
@@ -324,12 +326,17 @@ def run(names: Sequence[str] | None = None, repeats: int = 3, folder: Path | Non
     missing = [name for name in (MUJOCO, EXUDYN) if not _installed(name)]
     print(HEADING, flush=True)
     points: list[Point] = []
+    costs: list[Cost] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)
         for name in names or known:
-            for point in measure(known[name], repeats):
+            motion = known[name]
+            for point in measure(motion, repeats) if motion is not None else ():
                 points.append(point)
                 print(point, flush=True)
+            for cost in COSTS[name](repeats) if motion is None else ():
+                costs.append(cost)
+                print(cost, flush=True)
     if missing:
         print(f"{', '.join(missing)}: not installed; pip install 'symdyn[peers]'")
     missed = behind(points)
@@ -338,7 +345,9 @@ def run(names: Sequence[str] | None = None, repeats: int = 3, folder: Path | Non
     where = Path("generated/contacts") if folder is None else folder
     where.mkdir(parents=True, exist_ok=True)
     (where / "contacts.json").write_text(json.dumps([asdict(p) for p in points], indent=1) + "\n", encoding="utf-8")
-    if importlib.util.find_spec("matplotlib") is not None:
+    if costs:
+        (where / "costs.json").write_text(json.dumps([asdict(c) for c in costs], indent=1) + "\n", encoding="utf-8")
+    if points and importlib.util.find_spec("matplotlib") is not None:
         picture(points, where / "contacts.svg")
     print(f"wrote {where}")
-    return len(missed)
+    return len(missed) + sum(cost.value > cost.bound for cost in costs)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symdyn.cli import main
-from symdyn.lab import contacts
+from symdyn.lab import contact_costs, contacts
 from symdyn.lab.contacts import EXUDYN, LOCATED, STEPPED, Point
 
 
@@ -35,6 +35,18 @@ def test_runs_are_listed_with_their_errors(monkeypatch: pytest.MonkeyPatch, tmp_
     assert errors["billiard", STEPPED, 1e-3] < 0.02 * errors["billiard", STEPPED, 1e-2]  # of second order
     assert errors["ball", STEPPED, 1e-3] < 0.5 * errors["ball", STEPPED, 1e-2]
     assert (tmp_path / "contacts.svg").is_file() and str(points[0]) in capsys.readouterr().out
+
+
+def test_what_contacts_cost_is_listed_with_bounds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(contact_costs, "LINKS", (1,))
+    monkeypatch.setattr(contact_costs, "SPANS", (1.0,))
+    for factor, code in ((1e-9, 1), (1e9, 0)):
+        monkeypatch.setattr(contact_costs, "BOUNDS", {contact_costs.WALKER: 5.0 * factor, contact_costs.OPEN: 1.02 * factor})
+        assert main(["bench", "contacts", "--only", "walker", "open", "--repeats", "1", "--output", str(tmp_path)]) == code
+    walker, open_contacts = json.loads((tmp_path / "costs.json").read_text())
+    assert 900 < int(walker["of"].split()[0]) < 1200 and ", 87 heel strikes" in walker["of"] and walker["value"] > 0
+    assert 0.5 < open_contacts["value"] < 5 and "1 link, 1 s" in capsys.readouterr().out
 
 
 def test_another_program_that_is_quicker_at_an_error_counts(capsys: pytest.CaptureFixture[str]) -> None:

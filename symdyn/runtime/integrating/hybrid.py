@@ -244,7 +244,7 @@ class Motion:
         code = self.library.symdyn_hybrid_go(ctypes.byref(record))
         seconds = clock.perf_counter() - begun
         n, n_written, n_happened, n_impacts = record.n_phases, record.n_written, record.n_happened, record.n_impacts
-        t, x = times[:n_written], out[:n_written]
+        t, x = times[:n_written], out[:n_written] if 2 * n_written > len(out) else out[:n_written].copy()  # keeps no room
         outcome = Outcome(
             t, x, True, "reached the end", False, record.n_steps, record.n_rejected, record.n_evaluations, seconds,
             Corrections(record.largest_dq, record.largest_du, record.n_corrected, record.n_corrections),
