@@ -425,6 +425,7 @@ class _Phases:
         record.t, record.size, record.begins, record.n_fired = self.t, self.size, self.begun, len(self.fired)
         quick.x[:] = self.x
         quick.fired[:len(self.fired)] = [self.events[k][what] for k, what in self.fired]
+        quick.slipping[:] = 0
         quick.mode[:], quick.still[:], quick.passed[:] = [CODE_OF[mode] for mode in self.modes], self.still, self.passed
         quick.sign[:] = [direction[0] if len(direction) else 0.0 for direction in self.directions]
         latest = []
@@ -470,6 +471,7 @@ class _Phases:
         for k, sign in enumerate(quick.sign.tolist()):
             if len(self.directions[k]) and self.directions[k][0] != sign:
                 self.directions[k] = np.full(self.records[k].tangents, sign)
+        self.begins.directions = {k: self.directions[k] for k in np.flatnonzero(quick.slipping).tolist()}
         return done.code
 
     def _demand_seen(self, t: float, x: np.ndarray, passed: float) -> None:

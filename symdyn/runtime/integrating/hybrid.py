@@ -1,8 +1,8 @@
 """Motions with rigid contacts that go from phase to phase in C, as far as they need nothing that has to be thought about.
 
 The switches of symdyn.runtime.integrating.contacts in a plane, with Newton's law of impacts, of contacts whose rows do not depend
-on each other, are made in C between phases of the compiled integrator. Whatever else comes, such as slips that begin, several
-solutions, bouncing that ends, failures, is left to Python, after which C goes on.
+on each other, are made in C between phases of the compiled integrator. Whatever else comes, such as several solutions, bouncing
+that ends, failures, is left to Python, after which C goes on.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from symdyn.contact_kinds import CLUTCH
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
+from symdyn.runtime.integrating import slip_begins
 from symdyn.runtime.integrating.compiled import FAR, Problem, events_waiting
 from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -38,7 +39,7 @@ KINDS = ("closes", "opens", "sticks", "slips", "ignored", "counts")
 METHODS, NEWTON = ("dop853", "bs54", "radau", "radau5"), "newton"
 # Phases, and attempted steps, of one call.
 MOST_PHASES, MOST_STEPS = 256, 20_000
-CONTACTS, EVENTS, SHARED = "contacts", "events", "contacts_shared"
+CONTACTS, EVENTS, RHS, SHARED = "contacts", "events", "rhs", "contacts_shared"
 
 
 class PhaseCode(ctypes.Structure):
@@ -117,7 +118,7 @@ def _motion(module: Module, method: str, works: bool) -> Motion | None:
 
 def _is_plain(record: ContactRecord, parameters: Sequence[str]) -> bool:
     """Whether C knows the switches of a contact."""
-    return (record.normal and record.rows <= 2 and record.kind != CLUTCH and record.impact == NEWTON
+    return (record.tangents < 2 and record.kind != CLUTCH and (record.impact == NEWTON or not record.normal)
             and all(name in parameters for name in record.parameters))
 
 
@@ -137,12 +138,15 @@ class Motion:
         self.record = record = Record(
             n_q=sizes.q, n_u=sizes.u, n_state=sizes.x, n_x=n_x, n_p=self.n_p, n_contacts=n, n_rows=n_rows, n_events=n_events,
             most_steps=MOST_STEPS, most_phases=MOST_PHASES, most_happened=4 * MOST_PHASES + 2 * n_events,
-            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=laws.DEPENDENT, different=laws.DIFFERENT, far=FAR)
+            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=laws.DEPENDENT, different=laws.DIFFERENT, far=FAR,
+            tolerated=slip_begins.TOLERATED, rounded=slip_begins.ROUNDED, shortest=slip_begins.SHORTEST, guess=slip_begins.GUESS,
+            longest=slip_begins.LONGEST, grows=slip_begins.GROWS, larger=slip_begins.LARGER, guesses=slip_begins.GUESSES)
         place = {name: k for k, name in enumerate(metadata.parameters)}
         record.shared_at = place[SHARED]
         events = {event.name: k for k, event in enumerate(metadata.events)}
         tables = {
             "first": np.cumsum([0, *[one.rows for one in records]])[:-1], "rows": [one.rows for one in records],
+            "normal": [one.normal for one in records],
             "closed_at": [place.get(one.closed, -1) for one in records],
             "sticking_at": [place.get(one.sticking, -1) for one in records],
             "sliding_at": [place[one.sliding[0]] if one.sliding else -1 for one in records],
@@ -156,9 +160,10 @@ class Motion:
             take(record, name, np.zeros(size, dtype=np.intc)) for name, size in (
                 ("mode", n), ("still", n), ("passed", n), ("fired", n_events), ("happened", record.most_happened)))
         self.sign = take(record, "sign", np.zeros(n))
+        self.slipping = take(record, "slipping", np.zeros(n, dtype=np.intc))
         put(record, np.intc, old_mode=n, old_still=n, old_passed=n, ruled_out=n, look=n_events, leaves=n)
         put(record, float, old_sign=n, old_x=n_x, rows_of_events=events_waiting(n_events) * (2 + 2 * n_x),
-            states=max(2 * n_x, n_rows))
+            states=max(2 * n_x, n_rows), ahead=sizes.x + 2 * n)
         self.begin, self.end = (take(record, name, np.zeros(MOST_PHASES)) for name in ("phase_begin", "phase_end"))
         self.phase_p = take(record, "phase_p", np.zeros((MOST_PHASES + 1, self.n_p)))
         self.phase_mode = take(record, "phase_mode", np.zeros((MOST_PHASES, n), dtype=np.intc))
@@ -176,18 +181,21 @@ class Motion:
 
     def _functions(self) -> None:
         """What frames evaluate."""
-        record, memory, module = self.record, self.memory, self.module
-        seen = np.zeros(1), np.zeros(max(1, self.n_state)), self.inputs
-        memory.take(record, "t_now", seen[0])
-        memory.take(record, "x_now", seen[1])
-        ignored = any("ignored" in one.events for one in module.metadata.contacts)
+        self.seen = np.zeros(1), np.zeros(max(1, self.n_state)), self.inputs
+        self.memory.take(self.record, "t_now", self.seen[0])
+        self.memory.take(self.record, "x_now", self.seen[1])
+        ignored = any("ignored" in one.events for one in self.module.metadata.contacts)
         for name in (CONTACTS, *([EVENTS] if ignored else [])):
-            unit: Any = module.unit(name)
-            constants = memory.take(record, f"{name}_c", np.zeros(max(1, unit.metadata.n_c)))
-            setattr(record, f"n_{name}_c", unit.metadata.n_c)
-            prologue = f"{name}_prologue"
-            setattr(record, prologue, ctypes.cast(unit.function("prologue"), dict(Record._fields_)[prologue]))
-            memory.frame(record, name, unit, name, f"of_{name}", (*seen, self.p, constants))
+            self._frame(name, name, self.p)
+
+    def _frame(self, member: str, function: str, p: np.ndarray) -> None:
+        """A function of the module as a member of the record, with its constants."""
+        unit: Any = self.module.unit(function)
+        constants = self.memory.take(self.record, f"{member}_c", np.zeros(max(1, unit.metadata.n_c)))
+        setattr(self.record, f"n_{member}_c", unit.metadata.n_c)
+        prologue = f"{member}_prologue"
+        setattr(self.record, prologue, ctypes.cast(unit.function("prologue"), dict(Record._fields_)[prologue]))
+        self.memory.frame(self.record, member, unit, function, f"of_{member}", (*self.seen, p, constants))
 
     def _phase_code(self, unit: CUnit) -> ctypes.c_void_p:
         """The code of phases, of a unit with an integrator."""
@@ -230,6 +238,8 @@ class Motion:
             if not getattr(self.record, name) and self.module.has(field):
                 unit: Any = self.module.unit(field)
                 setattr(self.record, name, self._phase_code(unit))
+        if not self.record.rate and self.module.has(RHS):
+            self._frame("rate", RHS, self.memory.take(self.record, "rate_p", np.zeros(max(1, self.n_p))))
 
     def go(self, times: np.ndarray) -> Done:
         """Go on from the state in the record, writing states at times; the record has the state that it ends with."""

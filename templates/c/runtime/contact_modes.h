@@ -9,10 +9,11 @@
 
 enum { SYMDYN_MOST_SITES = 4, SYMDYN_MOST_ROWS = 2 * SYMDYN_MOST_SITES };
 
-// One contact: its first row, their number (1, or 2 with friction), coefficients of static and kinetic friction, the sign of the
-// slip that it has (0: none, it may stick or begin to slide), modes that are ruled out, by bits.
+// One contact: its first row, their number (1, or 2 with friction), whether it is dry friction of a joint, whose one row is
+// tangential and whose coefficients are forces, modes that are ruled out, by bits, coefficients of static and kinetic friction,
+// the sign of the slip that it has (0: none, it may stick or begin to slide).
 typedef struct {
-    int first, n, excluded;
+    int first, n, bounded, excluded;
     double adhesion, friction, slip;
 } symdyn_site;
 
@@ -27,6 +28,9 @@ typedef struct {
     int mode[SYMDYN_MOST_SITES];
     double sign[SYMDYN_MOST_SITES], lam[SYMDYN_MOST_ROWS], w[SYMDYN_MOST_ROWS];
 } symdyn_modes;
+
+// The row of friction of a site, -1: there is none.
+static int symdyn_rubs(const symdyn_site *site) { return site->bounded ? site->first : site->n > 1 ? site->first + 1 : -1; }
 
 static double symdyn_most(const double *v, int n) {
     double most = 0.0;
@@ -72,6 +76,18 @@ static double symdyn_force_size(const symdyn_modes *m, const double *lam, double
     return fmax(symdyn_most(lam, m->n), size / most);
 }
 
+// The size of w that counts.
+static double symdyn_size_of(const symdyn_modes *m) {
+    double size = fmax(symdyn_most(m->b, m->n), 1e-300);
+    for (int i = 0; i < m->n; i++) {
+        double given = 0.0;
+        for (int s = 0; s < m->n_sites; s++)
+            if (m->site[s].bounded) given += fabs(m->D[i][m->site[s].first]) * m->site[s].adhesion;
+        size = fmax(size, given);
+    }
+    return size;
+}
+
 // The forces of one combination of modes and what comes of them. Returns 1 if it is a solution, 0 if it breaks an inequality, -1
 // where rows depend on each other.
 static int symdyn_combination(const symdyn_modes *m, const int *mode, const double *sign, double *lam, double *w) {
@@ -79,39 +95,45 @@ static int symdyn_combination(const symdyn_modes *m, const int *mode, const doub
     int active[SYMDYN_MOST_ROWS], n = 0;
     for (int s = 0; s < m->n_sites; s++) {
         const symdyn_site *const site = m->site + s;
-        if (mode[s] != SYMDYN_OPEN) active[n++] = site->first;
-        if (mode[s] == SYMDYN_STICKING) active[n++] = site->first + 1;
+        if (mode[s] != SYMDYN_OPEN && !site->bounded) active[n++] = site->first;
+        if (mode[s] == SYMDYN_STICKING) active[n++] = symdyn_rubs(site);
     }
     for (int i = 0; i < n; i++) {
         x[i] = -m->b[active[i]];
         int j = 0;
         for (int s = 0; s < m->n_sites; s++) {
             const symdyn_site *const site = m->site + s;
-            const double *const row = m->D[active[i]] + site->first;
-            if (mode[s] == SYMDYN_OPEN) continue;
-            A[i][j++] = mode[s] == SYMDYN_SLIDING && site->n > 1 ? row[0] - site->friction * sign[s] * row[1] : row[0];
-            if (mode[s] == SYMDYN_STICKING) A[i][j++] = row[1];
+            const double *const row = m->D[active[i]];
+            const int k = site->first, rubs = symdyn_rubs(site);
+            const double along = mode[s] == SYMDYN_SLIDING && rubs >= 0 ? -site->friction * sign[s] * row[rubs] : 0.0;
+            if (site->bounded)
+                x[i] -= along;
+            else if (mode[s] != SYMDYN_OPEN)
+                A[i][j++] = row[k] + along;
+            if (mode[s] == SYMDYN_STICKING) A[i][j++] = row[rubs];
         }
     }
     if (symdyn_solve_rows(n, SYMDYN_MOST_ROWS, A[0], x, m->dependent)) return -1;
     for (int s = 0, j = 0; s < m->n_sites; s++) {
         const symdyn_site *const site = m->site + s;
-        lam[site->first] = mode[s] == SYMDYN_OPEN ? 0.0 : x[j++];
-        if (site->n > 1)
-            lam[site->first + 1] = mode[s] == SYMDYN_STICKING ? x[j++] : -site->friction * sign[s] * lam[site->first];
+        const int k = site->first, rubs = symdyn_rubs(site);
+        const double pressed = site->bounded ? 1.0 : mode[s] == SYMDYN_OPEN ? 0.0 : x[j++];
+        if (!site->bounded) lam[k] = pressed;
+        if (rubs >= 0) lam[rubs] = mode[s] == SYMDYN_STICKING ? x[j++] : -site->friction * sign[s] * pressed;
     }
     for (int i = 0; i < m->n; i++) {
         w[i] = m->b[i];
         for (int j = 0; j < m->n; j++) w[i] += m->D[i][j] * lam[j];
     }
     for (int i = 0; i < n; i++) w[active[i]] = 0.0;
-    const double size = fmax(symdyn_most(m->b, m->n), 1e-300), force = symdyn_force_size(m, lam, size);
+    const double size = symdyn_size_of(m), force = symdyn_force_size(m, lam, size);
     for (int s = 0; s < m->n_sites; s++) {
         const symdyn_site *const site = m->site + s;
-        const int k = site->first;
-        if (mode[s] == SYMDYN_OPEN ? w[k] < -m->noise * size : lam[k] < -m->noise * force) return 0;
-        if (mode[s] == SYMDYN_STICKING && fabs(lam[k + 1]) > site->adhesion * lam[k] + m->noise * force) return 0;
-        if (mode[s] == SYMDYN_SLIDING && site->n > 1 && site->slip == 0.0 && w[k + 1] * sign[s] < -m->noise * size) return 0;
+        const int k = site->first, rubs = symdyn_rubs(site);
+        const double bound = site->adhesion * (site->bounded ? 1.0 : lam[k]);
+        if (!site->bounded && (mode[s] == SYMDYN_OPEN ? w[k] < -m->noise * size : lam[k] < -m->noise * force)) return 0;
+        if (mode[s] == SYMDYN_STICKING && fabs(lam[rubs]) > bound + m->noise * force) return 0;
+        if (mode[s] == SYMDYN_SLIDING && rubs >= 0 && site->slip == 0.0 && w[rubs] * sign[s] < -m->noise * size) return 0;
     }
     return 1;
 }
@@ -119,7 +141,7 @@ static int symdyn_combination(const symdyn_modes *m, const int *mode, const doub
 // The modes of a site, the preferred ones first, with the signs of its slip. Returns how many.
 static int symdyn_options(const symdyn_site *site, int *mode, double *sign) {
     int n = 0;
-    const int known = site->n == 1 || site->slip != 0.0;
+    const int known = symdyn_rubs(site) < 0 || site->slip != 0.0;
     if (!known && !(site->excluded >> SYMDYN_STICKING & 1)) {
         mode[n] = SYMDYN_STICKING;
         sign[n++] = 0.0;
@@ -128,7 +150,7 @@ static int symdyn_options(const symdyn_site *site, int *mode, double *sign) {
         mode[n] = SYMDYN_SLIDING;
         sign[n++] = known ? site->slip : k ? -1.0 : 1.0;
     }
-    if (!(site->excluded >> SYMDYN_OPEN & 1)) {
+    if (!site->bounded && !(site->excluded >> SYMDYN_OPEN & 1)) {
         mode[n] = SYMDYN_OPEN;
         sign[n++] = 0.0;
     }
@@ -177,8 +199,8 @@ static int symdyn_solve_modes(symdyn_modes *m) {
         int steep[SYMDYN_MOST_SITES], slides = 0;
         for (int s = 0; s < m->n_sites; s++) {
             symdyn_site *const site = held.site + s;
-            steep[s] =
-                site->n > 1 && site->slip == 0.0 && site->friction != site->adhesion && !(site->excluded >> SYMDYN_STICKING & 1);
+            steep[s] = symdyn_rubs(site) >= 0 && site->slip == 0.0 && site->friction != site->adhesion
+                && !(site->excluded >> SYMDYN_STICKING & 1);
             if (steep[s]) site->friction = site->adhesion;
         }
         const int found = symdyn_only_solution(&held);
@@ -205,14 +227,12 @@ static int symdyn_on_a_border(const symdyn_modes *m, const symdyn_site *sites) {
     const double size = symdyn_most(m->b, m->n), force = symdyn_force_size(m, m->lam, size);
     for (int s = 0; s < m->n_sites; s++) {
         const symdyn_site *const site = sites + s;
-        const int k = site->first, rubs = site->n > 1;
+        const int k = site->first, rubs = symdyn_rubs(site);
         if (site->excluded) continue;
-        const double slip = rubs ? fabs(m->w[k + 1]) : 0.0,
-                     bound = site->adhesion * m->lam[k] - (rubs ? fabs(m->lam[k + 1]) : 0.0);
-        if (m->lam[k] > m->noise * force
-                ? rubs && site->slip == 0.0 && site->adhesion > 0.0 && slip <= m->noise * size && bound <= m->noise * force
-                : fabs(m->w[k]) <= m->noise * size)
-            return 1;
+        const double slip = rubs >= 0 ? fabs(m->w[rubs]) : 0.0;
+        const double bound = site->adhesion * (site->bounded ? 1.0 : m->lam[k]) - (rubs >= 0 ? fabs(m->lam[rubs]) : 0.0);
+        const int held = site->slip == 0.0 && site->adhesion > 0.0 && slip <= m->noise * size && bound <= m->noise * force;
+        if (site->bounded || m->lam[k] > m->noise * force ? rubs >= 0 && held : fabs(m->w[k]) <= m->noise * size) return 1;
     }
     return 0;
 }

@@ -9,7 +9,7 @@ SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h) {
     if (symdyn_take_parameters(h)) return SYMDYN_HYBRID_CONSTANTS;
     for (;;) {
         const int soon = h->n_phases && !(h->phase_end[h->n_phases - 1] - h->phase_begin[h->n_phases - 1] > h->same);
-        if (h->n_phases && !h->n_fired) return SYMDYN_HYBRID_DONE;
+        if (h->n_phases && !h->n_fired && h->t >= h->end) return SYMDYN_HYBRID_DONE;
         if (soon) return SYMDYN_HYBRID_SWITCH;
         if (h->n_phases >= h->most_phases || h->n_steps > h->most_steps || h->n_happened + h->n_contacts >= h->most_happened
             || h->n_impacts >= h->most_impacts)
@@ -19,17 +19,23 @@ SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h) {
     }
 }
 
-// The only solution of one problem alone, see contact_modes.h, of n sites with so many rows each, modes that are ruled out, and
-// friction (static, kinetic) and the sign of the slip of each; tolerances: noise, dependent, different. answer: signs of slips
-// (n), forces, what comes of them. Returns 1, 0 where there is none, -1 where that is not certain.
+// The only solution of one problem alone, see contact_modes.h, of n sites with so many rows each (0: one of dry friction of a
+// joint), modes that are ruled out, and friction (static, kinetic) and the sign of the slip of each; tolerances: noise,
+// dependent, different. answer: signs of slips (n), forces, what comes of them. Returns 1, 0 where there is none, -1 where that
+// is not certain.
 SYMDYN_EXPORT int symdyn_hybrid_modes(int n, const int *rows, const int *excluded, const double *coefficients, const double *D,
     const double *b, const double *tolerances, int *mode, double *answer) {
     symdyn_modes m = {.n_sites = n, .noise = tolerances[0], .dependent = tolerances[1], .different = tolerances[2]};
     for (int s = 0; s < n; s++) {
         const double *const of = coefficients + 3 * s;
-        m.site[s] = (symdyn_site){
-            .first = m.n, .n = rows[s], .excluded = excluded[s], .adhesion = of[0], .friction = of[1], .slip = of[2]};
-        m.n += rows[s];
+        m.site[s] = (symdyn_site){.first = m.n,
+            .n = rows[s] ? rows[s] : 1,
+            .bounded = !rows[s],
+            .excluded = excluded[s],
+            .adhesion = of[0],
+            .friction = of[1],
+            .slip = of[2]};
+        m.n += m.site[s].n;
     }
     for (int i = 0; i < m.n; i++) {
         m.b[i] = b[i];

@@ -1,6 +1,6 @@
 // A motion with rigid contacts in a plane, from phase to phase: what symdyn/runtime/integrating/contacts.py does, of which this
 // is the part without exceptions. Before a switch or a phase that needs more than that (rows that depend on each other, several
-// solutions or none, slips that begin, bouncing that comes to its end, failures) it stops, with all as it was, for the caller to
+// solutions or none, bouncing that comes to its end, failures) it stops, with all as it was, for the caller to
 // go on.
 #pragma once
 
@@ -40,6 +40,11 @@ static int symdyn_look_at(symdyn_hybrid *h, double t, const double *x) {
     return h->contacts(h->contacts_frame) ? SYMDYN_LEFT : 0;
 }
 
+// The row of friction of a contact, -1: there is none.
+static int symdyn_friction_of(const symdyn_hybrid *h, int k) {
+    return h->rows[k] > h->normal[k] ? h->first[k] + h->normal[k] : -1;
+}
+
 static int symdyn_event_of(const symdyn_hybrid *h, int contact, int kind) { return h->event[SYMDYN_KINDS * contact + kind]; }
 
 static int symdyn_has_fired(const symdyn_hybrid *h, int contact, int kind) {
@@ -71,18 +76,21 @@ static int symdyn_onto_surfaces(symdyn_hybrid *h, double t, double *x) {
     if (symdyn_look_at(h, t, x)) return SYMDYN_LEFT;
     symdyn_numbers at = symdyn_parts(h);
     for (int k = 0; k < h->n_contacts; k++)
-        if (h->mode[k] != SYMDYN_OPEN) {
+        if (h->mode[k] != SYMDYN_OPEN && h->normal[k]) {
             if (n >= SYMDYN_MOST_ROWS) return SYMDYN_LEFT;
             wanted[n] = -at.of_contact[4 * k];
             most = fmax(most, fabs(wanted[n]));
             row[n++] = h->first[k];
         }
-    if (!n) return 0;
-    if (most > 0.0) {
+    if (n && most > 0.0) {
         if (symdyn_moved(h, n, row, wanted, at.coordinates, h->n_q, x) || symdyn_look_at(h, t, x)) return SYMDYN_LEFT;
     }
     for (int k = 0; k < h->n_contacts; k++)
-        if (h->mode[k] != SYMDYN_OPEN && h->still[k] && h->rows[k] > 1) row[n++] = h->first[k] + 1;
+        if (h->mode[k] != SYMDYN_OPEN && h->still[k] && symdyn_friction_of(h, k) >= 0) {
+            if (n >= 2 * SYMDYN_MOST_ROWS) return SYMDYN_LEFT;
+            row[n++] = symdyn_friction_of(h, k);
+        }
+    if (!n) return 0;
     for (int i = 0; i < n; i++) wanted[i] = -at.slip[row[i]];
     if (symdyn_moved(h, n, row, wanted, at.speeds, h->n_u, x + h->n_q)) return SYMDYN_LEFT;
     return symdyn_look_at(h, t, x);
@@ -92,7 +100,8 @@ static int symdyn_onto_surfaces(symdyn_hybrid *h, double t, double *x) {
 static int symdyn_slow(const symdyn_hybrid *h, int k) {
     const symdyn_numbers at = symdyn_parts(h);
     const double fastest = symdyn_most(at.slip, h->n_rows);
-    return h->rows[k] < 2 || fabs(at.slip[h->first[k] + 1]) <= fmax(h->touching, h->no_speed * fastest);
+    const int rubs = symdyn_friction_of(h, k);
+    return rubs < 0 || fabs(at.slip[rubs]) <= fmax(h->touching, h->no_speed * fastest);
 }
 
 // The problem of n contacts at what frames look at, with b of all rows. Returns 0, or SYMDYN_LEFT where it is too large.
@@ -107,10 +116,11 @@ static int symdyn_problem_of(const symdyn_hybrid *h, int n, const int *contact, 
     m->different = h->different;
     for (int s = 0; s < n; s++) {
         const int k = contact[s];
-        const double v = h->rows[k] > 1 && !impact && !h->still[k] ? at.slip[h->first[k] + 1] : 0.0;
-        const double before = h->rows[k] > 1 && !impact && !h->still[k] ? h->sign[k] : 0.0;
+        const int rubs = impact || h->still[k] ? -1 : symdyn_friction_of(h, k);
+        const double v = rubs >= 0 ? at.slip[rubs] : 0.0, before = rubs >= 0 ? h->sign[k] : 0.0;
         m->site[s] = (symdyn_site){.first = m->n,
             .n = h->rows[k],
+            .bounded = !h->normal[k],
             .excluded = impact ? 0 : h->ruled_out[k],
             .adhesion = at.of_contact[4 * k + 1],
             .friction = at.of_contact[4 * k + 2],
@@ -203,12 +213,16 @@ static int symdyn_choose(symdyn_hybrid *h, int n, const int *contact, double *ac
         const symdyn_modes given = m;
         if (symdyn_solve_modes(&m) != 1 || symdyn_on_a_border(&m, given.site)) return SYMDYN_LEFT;
     }
-    for (int k = 0; k < h->n_contacts; k++) h->mode[k] = SYMDYN_OPEN;
+    for (int k = 0; k < h->n_contacts; k++) {
+        h->mode[k] = SYMDYN_OPEN;
+        h->slipping[k] = 0;
+    }
     for (int s = 0; s < n; s++) {
         const int k = contact[s];
         h->mode[k] = m.mode[s];
-        h->sign[k] = m.mode[s] == SYMDYN_SLIDING && h->rows[k] > 1 ? m.sign[s] : 0.0;
-        if (h->still[k] && m.mode[s] == SYMDYN_SLIDING && h->rows[k] > 1) return SYMDYN_LEFT;  // its slip begins
+        const int slides = m.mode[s] == SYMDYN_SLIDING && symdyn_friction_of(h, k) >= 0;
+        h->sign[k] = slides ? m.sign[s] : 0.0;
+        h->slipping[k] = h->still[k] && slides;
         h->still[k] = m.mode[s] == SYMDYN_STICKING;
         for (int i = 0; i < h->rows[k]; i++)
             for (int j = 0; j < h->n_rows; j++)
@@ -266,10 +280,16 @@ static int symdyn_make_switch(symdyn_hybrid *h) {
     if (symdyn_onto_surfaces(h, t, h->x)) return SYMDYN_LEFT;
     const symdyn_numbers at = symdyn_parts(h);
     h->size = fmax(h->size, symdyn_most(h->x, h->n_q));
-    for (int k = 0; k < h->n_contacts; k++) h->size = fmax(h->size, fabs(at.of_contact[4 * k]));
+    for (int k = 0; k < h->n_contacts; k++)
+        if (h->normal[k]) h->size = fmax(h->size, fabs(at.of_contact[4 * k]));
     most = symdyn_most(h->x, h->n_state);
     const double near = start ? h->touching : h->together * fmax(1.0, most);
     for (int k = 0; k < h->n_contacts; k++) {
+        closing[k] = hit[k] = 0;
+        if (!h->normal[k]) {
+            if (start) h->still[k] = symdyn_slow(h, k);
+            continue;
+        }
         const double v = at.slip[h->first[k]];
         const int touches = fabs(at.of_contact[4 * k]) <= near && v <= (start ? h->touching : 0.0);
         closing[k] = symdyn_has_fired(h, k, SYMDYN_CLOSES) || (h->mode[k] == SYMDYN_OPEN && !h->passed[k] && touches);
@@ -280,13 +300,19 @@ static int symdyn_make_switch(symdyn_hybrid *h) {
         contact[n++] = k;
     }
     for (int k = 0; k < h->n_contacts && !any_hit; k++)
-        if (closing[k]) h->still[k] = symdyn_slow(h, k);
+        if (closing[k] || !h->normal[k]) h->still[k] = symdyn_slow(h, k);
     for (int k = 0; k < h->n_contacts; k++) h->leaves[k] = 0;
     if (any_hit && symdyn_impact(h, n, contact, hit)) return SYMDYN_LEFT;
-    int n_closed = 0;
-    for (int s = 0; s < n; s++)
-        if (!h->leaves[contact[s]]) contact[n_closed++] = contact[s];
-    if (symdyn_choose(h, n_closed, contact, acceleration)) return SYMDYN_LEFT;
+    int n_closed = 0, touched = 0;
+    int closed[SYMDYN_MOST_SITES];
+    for (int k = 0; k < h->n_contacts; k++) {
+        const int touches = touched < n && contact[touched] == k;
+        touched += touches;
+        if (h->normal[k] ? !touches || h->leaves[k] : 0) continue;
+        if (n_closed >= SYMDYN_MOST_SITES) return SYMDYN_LEFT;
+        closed[n_closed++] = k;
+    }
+    if (symdyn_choose(h, n_closed, closed, acceleration)) return SYMDYN_LEFT;
     for (int k = 0; k < h->n_contacts; k++)
         if (h->leaves[k] && symdyn_flight_is_short(h, k, acceleration[h->first[k]])) return SYMDYN_LEFT;
     return symdyn_pass_by(h, h->x, 0);
@@ -316,6 +342,7 @@ static int symdyn_switch(symdyn_hybrid *h) {
         h->still[k] = h->old_still[k];
         h->passed[k] = h->old_passed[k];
         h->sign[k] = h->old_sign[k];
+        h->slipping[k] = 0;
     }
     return SYMDYN_LEFT;
 }
@@ -336,8 +363,83 @@ static int symdyn_parameters(const symdyn_hybrid *h, double *p) {
     return any;
 }
 
-// The events that the modes of contacts can end with.
-static void symdyn_looked_for(symdyn_hybrid *h) {
+// Whether the slip of any contact begins.
+static int symdyn_begins_to_slip(const symdyn_hybrid *h) {
+    int any = 0;
+    for (int k = 0; k < h->n_contacts; k++) any |= h->slipping[k];
+    return any;
+}
+
+// The error of slips that begin which the tolerances of the speeds let pass. Returns SYMDYN_LEFT where it is not known.
+static int symdyn_tolerated(symdyn_hybrid *h, double *tolerated) {
+    const symdyn_numbers at = symdyn_parts(h);
+    double *const moved = h->ahead, *const sum = h->ahead + h->n_state, *const slip = sum + h->n_contacts;
+    if (symdyn_look_at(h, h->t, h->x)) return SYMDYN_LEFT;
+    for (int i = 0; i < h->n_state; i++) moved[i] = h->x[i];
+    for (int k = 0; k < h->n_contacts; k++) {
+        sum[k] = 0.0;
+        slip[k] = h->slipping[k] ? at.slip[symdyn_friction_of(h, k)] : 0.0;
+    }
+    for (int j = h->n_q; j < h->n_q + h->n_u; j++) {  // slips are linear in the speeds
+        moved[j] = h->x[j] + 1.0;
+        if (symdyn_look_at(h, h->t, moved)) return SYMDYN_LEFT;
+        moved[j] = h->x[j];
+        for (int k = 0; k < h->n_contacts; k++)
+            if (h->slipping[k])
+                sum[k] += fabs(at.slip[symdyn_friction_of(h, k)] - slip[k]) * (h->atol[j] + h->rtol * fabs(h->x[j]));
+    }
+    *tolerated = symdyn_most(sum, h->n_contacts);
+    return 0;
+}
+
+static int symdyn_rate_at(symdyn_hybrid *h, double t, const double *x) {
+    *h->t_now = t;
+    for (int i = 0; i < h->n_state; i++) h->x_now[i] = x[i];
+    return h->rate(h->rate_frame) ? SYMDYN_LEFT : 0;
+}
+
+// Until when the directions of slips that begin are held; p: the parameters with the modes.
+static int symdyn_held_until(symdyn_hybrid *h, const double *p, double *until) {
+    const symdyn_numbers at = symdyn_parts(h);
+    const double length = h->end - h->begin, eps = 2.220446049250313e-16;
+    double wanted = 0.0, *const slope = h->states, *const ahead = h->ahead;
+    if (!h->rate || symdyn_tolerated(h, &wanted)) return SYMDYN_LEFT;
+    for (int i = 0; i < h->n_p; i++) h->rate_p[i] = p[i];
+    if (h->rate_prologue(h->rate_p, h->rate_c) || !symdyn_all_finite(h->rate_c, h->n_rate_c)) return SYMDYN_LEFT;
+    wanted = h->tolerated * wanted + h->rounded * symdyn_most(h->x, h->n_state);
+    const double shortest = fmax(h->shortest * length, 64.0 * eps * fabs(h->t)), most = h->longest * length;
+    double after = fmax(h->guess * length, shortest);
+    if (symdyn_rate_at(h, h->t, h->x)) return SYMDYN_LEFT;
+    for (int i = 0; i < h->n_state; i++) slope[i] = h->of_rate[i];
+    for (int guess = 0; guess < h->guesses; guess++) {
+        for (int i = 0; i < h->n_state; i++) ahead[i] = h->x[i] + after * slope[i];
+        if (symdyn_rate_at(h, h->t + after, ahead)) return SYMDYN_LEFT;
+        for (int i = 0; i < h->n_state; i++) ahead[i] = h->x[i] + 0.5 * after * (slope[i] + h->of_rate[i]);
+        if (symdyn_look_at(h, h->t + after, ahead)) return SYMDYN_LEFT;
+        double slip = 1e300;
+        for (int k = 0; k < h->n_contacts; k++)
+            if (h->slipping[k]) slip = fmin(slip, at.slip[symdyn_friction_of(h, k)] * h->sign[k]);
+        if (slip > h->larger * wanted && after > shortest)
+            after = fmax(shortest, after * 2.0 * wanted / slip);
+        else if (slip >= wanted || after >= most || slip < -wanted)
+            break;
+        else
+            after = fmin(most, after * fmin(h->grows, fmax(1.5, sqrt(2.0 * wanted / fmax(slip, 1e-300)))));
+    }
+    *until = fmin(h->t + after, h->end);
+    return 0;
+}
+
+// Whether a contact slips against its direction at what frames look at.
+static int symdyn_slips_back(const symdyn_hybrid *h) {
+    const symdyn_numbers at = symdyn_parts(h);
+    for (int k = 0; k < h->n_contacts; k++)
+        if (h->mode[k] == SYMDYN_SLIDING && h->sign[k] != 0.0 && at.slip[symdyn_friction_of(h, k)] * h->sign[k] < 0.0) return 1;
+    return 0;
+}
+
+// The events that the modes of contacts can end with; held: directions of slips are.
+static void symdyn_looked_for(symdyn_hybrid *h, int held) {
     for (int k = 0; k < h->n_events; k++) h->look[k] = 0;
     for (int k = 0; k < h->n_contacts; k++)
         for (int kind = 0; kind < SYMDYN_KINDS; kind++) {
@@ -346,8 +448,8 @@ static void symdyn_looked_for(symdyn_hybrid *h) {
             h->look[event] = kind == SYMDYN_CLOSES || kind == SYMDYN_IGNORED ? open && !h->passed[k]
                 : kind == SYMDYN_COUNTS                                      ? open && h->passed[k]
                 : kind == SYMDYN_OPENS                                       ? !open
-                : kind == SYMDYN_SLIPS                                       ? h->mode[k] == SYMDYN_STICKING
-                                                                             : h->mode[k] == SYMDYN_SLIDING && h->sign[k] != 0.0;
+                : kind == SYMDYN_SLIPS ? h->mode[k] == SYMDYN_STICKING
+                                       : h->mode[k] == SYMDYN_SLIDING && h->sign[k] != 0.0 && !held;
         }
 }
 
@@ -369,8 +471,11 @@ static int symdyn_phase(symdyn_hybrid *h) {
     if (!code) return SYMDYN_LEFT;
     for (int i = 0; i < h->n_p; i++) code->p[i] = p[i];
     if (any && (code->prologue(code->p, code->c) || !symdyn_all_finite(code->c, code->n_constants))) return SYMDYN_LEFT;
-    const double span[] = {h->t, h->end, h->rtol, h->first_step, h->max_step};
-    symdyn_looked_for(h);
+    const int held = symdyn_begins_to_slip(h);
+    double until = h->end;
+    if (held && symdyn_held_until(h, p, &until)) return SYMDYN_LEFT;
+    const double span[] = {h->t, until, h->rtol, h->first_step, h->max_step};
+    symdyn_looked_for(h, held);
     if (code->start(code->memory, code->problem, span, h->x, h->atol) < 0) return SYMDYN_LEFT;
     code->look(code->memory, h->look, h->spacing);
     long written = 0;
@@ -385,6 +490,7 @@ static int symdyn_phase(symdyn_hybrid *h) {
     code->report(code->memory, &report, h->states);
     if (report.largest_moved > h->far || symdyn_look_at(h, report.t, h->states) || symdyn_missed_one(h, report.t - h->t))
         return SYMDYN_LEFT;
+    if (held && !n && report.t < h->end && symdyn_slips_back(h)) return SYMDYN_LEFT;
     for (long i = 0; i < n; i++) {
         const double *const note = h->rows_of_events + i * (2 + 2 * h->n_x);
         h->fired[i] = h->happened[h->n_happened] = (int)note[0];
@@ -394,7 +500,10 @@ static int symdyn_phase(symdyn_hybrid *h) {
     }
     const double *const at_end = n ? h->rows_of_events + (n - 1) * (2 + 2 * h->n_x) + 2 : h->states;
     for (int i = 0; i < h->n_x; i++) h->x[i] = at_end[i];
-    for (int k = 0; k < h->n_contacts; k++) h->phase_mode[h->n_contacts * h->n_phases + k] = h->mode[k];
+    for (int k = 0; k < h->n_contacts; k++) {
+        h->phase_mode[h->n_contacts * h->n_phases + k] = h->mode[k];
+        h->slipping[k] = 0;
+    }
     h->n_fired = (int)n;
     h->phase_begin[h->n_phases] = h->t;
     h->phase_end[h->n_phases] = h->t = report.t;

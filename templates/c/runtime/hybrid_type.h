@@ -2,10 +2,11 @@
 #pragma once
 
 typedef struct {
-    // The mechanism. Of every contact: its first row, their number, places in p of what says that it is closed, that it sticks,
-    // the sign of its slip, and the events that end its modes: closes, opens, sticks, slips, ignored, counts; -1: there is none.
+    // The mechanism. Of every contact: its first row, their number, whether the first one is a normal one, places in p of what
+    // says that it is closed, that it sticks, the sign of its slip, and the events that end its modes: closes, opens, sticks,
+    // slips, ignored, counts; -1: there is none.
     int n_q, n_u, n_state, n_x, n_p, n_contacts, n_rows, n_events;  // n_x: with the work of the loads
-    const int *first, *rows, *closed_at, *sticking_at, *sliding_at, *event;
+    const int *first, *rows, *normal, *closed_at, *sticking_at, *sliding_at, *event;
     int shared_at;  // place in p of the softness of rows that depend on each other
 
     void *open, *closed;  // the code of phases in which all contacts are open, and of all others; none: not made so far
@@ -21,6 +22,12 @@ typedef struct {
     int (*events_prologue)(const double *p, double *c);
     double *events_c;
     int n_events_c;
+    int (*rate)(void *frame);  // x_dot in the modes of rate_p; none: not made so far
+    void *rate_frame;
+    const double *of_rate;
+    int (*rate_prologue)(const double *p, double *c);
+    double *rate_p, *rate_c;
+    int n_rate_c;
     double *t_now, *x_now, *p;  // what frames read
 
     // The run, and the constants of its laws.
@@ -29,15 +36,20 @@ typedef struct {
     long most_steps;  // attempted, of one phase, and of one call
     double touching, together, missed, no_speed, noise, dependent, different, energy, shortest_flight, lowest_flight, far;
 
+    // How slips begin, see symdyn/runtime/integrating/slip_begins.py.
+    double tolerated, rounded, shortest, guess, longest, grows, larger;
+    int guesses;
+
     // Where it is: before a switch, if it begins or events have fired, else before a phase.
     double t, size;
     double *x;
     int begins, n_fired;
     int *fired;                  // events, places of the module's
     int *mode, *still, *passed;  // of every contact; whether it does not slip; whether it is ignored while open
+    int *slipping;               // whether its slip begins, so that its direction is held
     double *sign;                // of its slip, 0: none
     int *old_mode, *old_still, *old_passed, *ruled_out, *look, *leaves;
-    double *old_sign, *old_x, *rows_of_events, *states;
+    double *old_sign, *old_x, *rows_of_events, *states, *ahead;
 
     // What it has done. Output times with states; phases with their begin, end, parameters, modes, and how many output times,
     // events and impacts there are by their end; events and impacts.
