@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.errors import SimulationInterrupted
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
@@ -182,3 +183,32 @@ def test_motions_are_those_with_every_switch_in_python(name: str, method: str, m
         assert len(one.t) == len(slow.events[event].t)
     assert len(quick.doubts) == len(slow.doubts)
     assert np.abs(quick.energy_balance["error"]).max() < 1e-6
+
+
+def test_a_motion_in_pieces_is_the_same_and_keeps_what_was_done_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Records of C that hold eight phases are emptied in between; the third call of it is interrupted."""
+    whole = ball(restitution=0.8).compile().simulate((0, 3), q=[0.5])
+    monkeypatch.setattr(hybrid, "MOST_PHASES", 8)
+    module = ball(restitution=0.8).compile()
+    parts = module.simulate((0, 3), q=[0.5])
+    assert np.array_equal(parts.x, whole.x) and np.array_equal(parts.t, whole.t)
+    for one, two in ((parts.contacts["floor"].impacts, whole.contacts["floor"].impacts),):
+        assert np.array_equal(one.t, two.t) and np.array_equal(one.impulse, two.impulse)
+    assert np.array_equal(parts.events["floor_closes"].t, whole.events["floor_closes"].t)
+    assert [one.after[1] for one in parts._happened] == [one.after[1] for one in whole._happened]
+    assert parts._happened[0].before[1] == pytest.approx(-np.sqrt(G)) and parts._happened[0].after[1] > 0
+    calls, go = [], hybrid.Motion.go
+
+    def interrupted(self: hybrid.Motion, times: np.ndarray) -> hybrid.Done:
+        calls.append(go(self, times))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return calls[-1]
+
+    monkeypatch.setattr(hybrid.Motion, "go", interrupted)
+    with pytest.raises(SimulationInterrupted) as stopped:
+        module.simulate((0, 3), q=[0.5])
+    kept = stopped.value.solution
+    assert len(kept.events["floor_closes"].t) == 16 and len(kept.contacts["floor"].impacts.t) == 15
+    assert np.array_equal(kept.events["floor_closes"].t, whole.events["floor_closes"].t[:16])
+    assert len(kept.t) > 100 and np.array_equal(kept.x[:-1], whole.x[:len(kept.t) - 1])

@@ -410,17 +410,22 @@ class _Phases:
     def _quickly(self, quick: Motion) -> bool:
         """Go on in C as far as that goes; whether it is the end."""
         while True:
-            self._hand_over(quick)
+            latest = self._hand_over(quick)
             assert self.request.times is not None
             first = np.searchsorted(self.request.times, self.t, "right" if self.done else "left")
-            code = self._take_over(quick, quick.go(self.request.times[first:]))
+            try:
+                done = quick.go(self.request.times[first:])
+            except KeyboardInterrupt:
+                self.happened += latest
+                raise
+            code = self._take_over(quick, done)
             if code == CODES.HYBRID_CONSTANTS:
                 self.quick = None
             if code != CODES.HYBRID_FULL:
                 return code == CODES.HYBRID_DONE
 
-    def _hand_over(self, quick: Motion) -> None:
-        """Put what C goes on from into its record, with the events of the latest time, which impacts may change."""
+    def _hand_over(self, quick: Motion) -> list[Happened]:
+        """Put what C goes on from into its record, with the events of the latest time, which impacts may change: these."""
         record = quick.record
         record.t, record.size, record.begins, record.n_fired = self.t, self.size, self.begun, len(self.fired)
         quick.x[:] = self.x
@@ -428,13 +433,14 @@ class _Phases:
         quick.slipping[:] = 0
         quick.mode[:], quick.still[:], quick.passed[:] = [CODE_OF[mode] for mode in self.modes], self.still, self.passed
         quick.sign[:] = [direction[0] if len(direction) else 0.0 for direction in self.directions]
-        latest = []
+        latest: list[Happened] = []
         while self.fired and self.happened and self.happened[-1].t == self.t:
-            latest.append(self.happened.pop())
+            latest.insert(0, self.happened.pop())
         record.n_happened = len(latest)
-        for k, one in enumerate(reversed(latest)):
+        for k, one in enumerate(latest):
             quick.happened[k], quick.happened_t[k] = one.event, one.t
             quick.happened_states[k] = one.before, one.after
+        return latest
 
     def _take_over(self, quick: Motion, done: Done) -> int:
         """Note what C has done, and go on from there; the code by which it ended."""
