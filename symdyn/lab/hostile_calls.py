@@ -431,10 +431,10 @@ def _solutions() -> list[Call]:
         _call("Solution.view", on("view"), {"path": FREE, "compare": FREE, "forces": FLAG},
               lambda: {"path": None, "compare": None, "forces": False}),
         _call("Solution.plot", on("plot"), {"path": FREE, "view": NUMBERS}, lambda: {"path": None, "view": None}),
-        _call("Solution.picture", on("picture"), {"t": NUMBERS, "path": FREE, "view": NUMBERS},
-              lambda: {"t": 0.05, "path": None, "view": None}, t=frozenset({"text", "nul"})),
-        _call("Solution.animate", on("animate"), {"path": FREE, "fps": WHOLE, "speed": NUMBER, "view": NUMBERS},
-              lambda: {"path": None, "fps": 25, "speed": 1.0, "view": None}, fps=frozenset({"number"})),
+        _call("Solution.picture", on("picture"), {"t": NUMBERS, "path": FREE, "view": NUMBERS, "forces": FLAG},
+              lambda: {"t": 0.05, "path": None, "view": None, "forces": False}, t=frozenset({"text", "nul"})),
+        _call("Solution.animate", on("animate"), {"path": FREE, "fps": WHOLE, "speed": NUMBER, "view": NUMBERS, "forces": FLAG},
+              lambda: {"path": None, "fps": 25, "speed": 1.0, "view": None, "forces": False}, fps=frozenset({"number"})),
     ]
 
 

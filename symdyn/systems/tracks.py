@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from symdyn.model import shapes
 from symdyn.model.joints import Prismatic, Revolute
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
@@ -57,6 +58,7 @@ def vehicle_on_rotating_track(track_inertia: bool = True) -> System:
     # The joint of the vehicle comes first so that q = [q1, q2], the lecture's order.
     system.add_joint(Prismatic("slider", track, vehicle, q1, axis=slide))
     system.add_joint(Revolute("hinge", system.ground, track, q2, axis=[0, 0, turn]))
+    system.draw(track, shapes.Line([(-1.5, 0), (1.5, 0)], 3.0))
     system.defaults = {g: 9.81, m_v: 1.0, m_t: 2.0, I_t: 0.5} if track_inertia else {g: 9.81, m: 1.0}
     system.initial = {q1: 1.0, q2: 0.3, q2.dot: 0.5}
     return system

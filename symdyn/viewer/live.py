@@ -12,6 +12,7 @@ import numpy as np
 from symdyn.arguments import take
 from symdyn.emission import emit
 from symdyn.errors import ArgumentError, SymdynError
+from symdyn.formulation.constraints.augmented import augment
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.arrows import POINTS
@@ -54,7 +55,7 @@ def show(system: System, path: Any = None, params: Numbers | None = None, q: Val
 
 def mechanism_of(model: Model) -> tuple[Mechanism, np.ndarray]:
     """The mechanism of a model at its initial coordinates, its loops as they are there, and the lengths of its shapes."""
-    equations = embed(replace(model, loops=(), constraints=()))
+    equations = augment(model) if model.loops or model.constraints else embed(model)
     values, _ = _values(equations, None, None)
     numbers = _evaluate(equations, [n for n in _POSES if n in equations.quantities], values)
     return _mechanism(equations, numbers, values), numbers.get("drawn_lengths", np.zeros(0)).ravel()

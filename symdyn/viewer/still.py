@@ -18,10 +18,12 @@ from symdyn.pictures.solids import color_of, filled
 _WIDE, _HIGH, _MARGIN = 260, 200, 12
 # The camera of the page: azimuth and elevation.
 _AZIMUTH, _ELEVATION = -0.95, 0.34
+# Radius of a circle at least, pixels.
+_LEAST = 3.0
 # What is left of a colour on faces that are turned away from the light.
 _SHADE = 0.62
 
-# Depth, SVG text with places to be filled in, and the points and lengths that fill them.
+# Depth, points, half the width in m, of a wire the width in pixels, colour, and what is drawn through the points.
 Shape = tuple[float, np.ndarray, float, str, str]
 
 
@@ -29,14 +31,15 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     """The mechanism as an SVG element; records: shapes of the user's, with lengths in place of None."""
     items, _ = looks_of(m)
     axes = _camera(m)
-    shapes = [shape for item in items if not item.layer for shape in _of_item(m, item, axes)]
-    shapes += [shape for record in filled(records, lengths) if record["kind"] != "water"
-               for shape in _of_record(m, record, axes, name)]
+    # At the same depth rules draw over shapes: a particle over its track.
+    shapes = [shape for record in filled(records, lengths) if record["kind"] != "water"
+              for shape in _of_record(m, record, axes, name)]
+    shapes += [shape for item in items if not item.layer for shape in _of_item(m, item, axes)]
     if not shapes:
         return ""
     # A rail that leaves the picture does not make the rest small.
-    seen = np.concatenate([np.concatenate([points - wide, points + wide]) for _, points, wide, _, kind in shapes
-                           if kind != "rail"] or [shapes[0][1]])
+    room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind != "rail"]
+    seen = np.concatenate([end for points, wide in room or [(shapes[0][1], 0.0)] for end in (points - wide, points + wide)])
     low, high = seen.min(axis=0), seen.max(axis=0)
     span = np.maximum(high - low, 1e-9)
     scale = min((_WIDE - 2 * _MARGIN) / span[0], (_HIGH - 2 * _MARGIN) / span[1])
@@ -94,11 +97,14 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
 
 def _of_record(m: Mechanism, record: Mapping[str, Any], axes: np.ndarray, name: str) -> Iterator[Shape]:
     """Faces of a shape of the user's that are seen, and its lines."""
-    body = m.index(record["body"])
-    o, R = (np.zeros(3), np.eye(3)) if body == GROUND else (m.frames[body, :3], m.frames[body, 3:].reshape(3, 3))
+    body, to = m.index(record["body"]), record.get("to")
+    o, R = _frame(m, body)
     color = PALETTE[body % len(PALETTE)] if record["color"] is None else to_hex(color_of(record["color"], name))
     for part in parts_of(record, 0, (0.0, 0.0, 0.0)):
         placed = o + part.vertices @ R.T
+        if to is not None:
+            p, Q = _frame(m, m.index(to))
+            placed[-1] = p + Q @ part.vertices[-1]
         for face, corners in zip(part.faces, part.corners, strict=True):
             a, b, c, _ = placed[corners]
             normal = np.cross(b - a, c - a)
@@ -107,7 +113,12 @@ def _of_record(m: Mechanism, record: Mapping[str, Any], axes: np.ndarray, name: 
                 points = placed[face]
                 yield float(points.mean(axis=0) @ axes[2]), points @ axes[:2].T, 0.0, _shaded(color, toward), "polygon"
         if not part.faces:
-            yield float(placed.mean(axis=0) @ axes[2]), placed @ axes[:2].T, 0.0, color, "line"
+            yield float(placed.mean(axis=0) @ axes[2]), placed @ axes[:2].T, part.width, color, "wire"
+
+
+def _frame(m: Mechanism, body: int) -> tuple[np.ndarray, np.ndarray]:
+    """Origin and rotation of a body's frame, or of the ground's."""
+    return (np.zeros(3), np.eye(3)) if body == GROUND else (m.frames[body, :3], m.frames[body, 3:].reshape(3, 3))
 
 
 def _hull(points: np.ndarray, axes: np.ndarray, color: str) -> Iterator[Shape]:
@@ -146,9 +157,10 @@ def _shaded(color: str, toward: float) -> str:
 def _text(points: np.ndarray, wide: float, color: str, kind: str, scale: float, middle: np.ndarray) -> str:
     places = [(_WIDE / 2 + scale * (x - middle[0]), _HIGH / 2 - scale * (y - middle[1])) for x, y in points]
     if kind == "circle":
-        return f'<circle cx="{places[0][0]:.1f}" cy="{places[0][1]:.1f}" r="{max(scale * wide, 1.0):.1f}" fill="{color}"/>'
+        return f'<circle cx="{places[0][0]:.1f}" cy="{places[0][1]:.1f}" r="{max(scale * wide, _LEAST):.1f}" fill="{color}"/>'
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     if kind == "polygon":
         return f'<polygon points="{path}" fill="{color}" stroke="{color}" stroke-width="0.4"/>'
-    return (f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{max(2 * scale * wide, 1.0):.1f}" '
+    width = wide if kind == "wire" else max(2 * scale * wide, 1.0)
+    return (f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{width:.1f}" '
             'stroke-linecap="round" stroke-linejoin="round"/>')

@@ -24,6 +24,8 @@ from tests.user_functions import HEIGHT
 
 pytest.importorskip("matplotlib")
 
+from symdyn.pictures.looks import METAL
+
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
@@ -385,6 +387,17 @@ def test_a_system_shows_a_picture_and_tables(name: str) -> None:
                        for v in re.split("[ ,]", points)]).reshape(-1, 2)
     assert len(places) > 10 and np.ptp(places, axis=0).max() > 100
     assert all(f"<td>{body.name}</td>" in text for body in system.check().bodies[:12])
+
+
+def test_small_pictures_have_loops_and_lines_to_other_bodies() -> None:
+    """The rocker of a four-bar linkage stands on the ground; an axle goes from wheel to wheel, as wide as it is drawn."""
+    loop = re.search(r"<svg .*?</svg>", sd.systems.four_bar()._repr_html_() or "")
+    assert loop is not None and loop[0].count("<polyline") == 3 and loop[0].count(METAL) == 4  # two stands: fill and edge
+    axle = sd.systems.car_axis()._repr_html_() or ""
+    found = re.findall(r'<polyline points="([^"]*)"[^>]*stroke-width="([^"]*)"', axle)
+    (ends,) = [np.array([v.split(",") for v in points.split()], dtype=float) for points, width in found if width == "4.0"]
+    wheels = np.array(re.findall(r'cx="([^"]*)" cy="([^"]*)"', axle), dtype=float)
+    assert len(ends) == 2 and all(np.abs(wheels - end).sum(axis=1).min() < 0.2 for end in ends)
 
 
 def test_a_system_with_faults_shows_them() -> None:
