@@ -24,13 +24,13 @@ class Problem:
         n = n_rows // rows
         self.J, self.free, self.friction, self.rows = J, free, np.array(friction), rows
         self.memory = Memory()
-        self.record = record = cones(self.memory, n_u, n, n_rows * n_u, dense)
+        self.record = record = cones(self.memory, n_u, n, n * n_u, dense)
         record.n = n
-        arrays = {"first": np.arange(n + 1) * rows, "entry": np.arange(n_rows + 1) * n_u,
-                  "speed": np.tile(np.arange(n_u), n_rows)}
-        for name, values in arrays.items():
+        for name, values in {"first": np.arange(n + 1) * rows, "entry": np.arange(n + 1) * n_u}.items():
             self.memory.take(record, name, values.astype(np.dtype("long")))
-        entries = np.ascontiguousarray(J).ravel()
+        self.memory.take(record, "speed", np.tile(np.arange(n_u), n).astype(np.intc))
+        entries = np.zeros((n, n_u, 3))
+        entries[:, :, :rows] = J.reshape(n, rows, n_u).transpose(0, 2, 1)
         for name, values in {"along": entries, "answer": entries, "friction": self.friction, "free": free}.items():
             self.memory.take(record, name, values)
         self.memory.take(record, "bounded", np.full(n, bounded, dtype=np.intc))
@@ -112,4 +112,21 @@ def test_newton_ends_what_sweeps_approach_slowly() -> None:
     np.testing.assert_allclose(falling.P, n - np.arange(n), rtol=1e-11)
     assert falling.record.n_sweeps < 100
     slow = Problem(J, -J @ np.ones(n), [0.0] * n, rows=1, dense=0)
-    assert slow.solve(60) > 1e-6  # without it so many sweeps are far off
+    assert slow.solve(12) > 1e-6  # without it so many sweeps are far off
+
+
+def test_sweeps_alone_reach_the_laws_where_a_matrix_has_no_room() -> None:
+    generator, n = np.random.default_rng(3), 40
+    J = generator.uniform(-1, 1, (3 * n, 150))
+    problem = Problem(J, J @ generator.uniform(-1, 1, 150), generator.uniform(0, 1, n).tolist(), dense=0)
+    assert problem.solve(3000) <= TOLERANCE
+    assert problem.missed() < 1e-11 and not problem.record.n_newton
+
+
+def test_more_contacts_stick_than_the_speeds_allow() -> None:
+    """A body of two speeds that creeps in a wedge of two walls, against which it would stick: one of them lets it slip at last."""
+    walls = [np.array([np.cos(a), np.sin(a)]) for a in (np.radians(89), np.radians(91))]
+    J = np.array([row for n in walls for row in (n, [n[1], -n[0]])])
+    problem = Problem(J, J @ [1e-4, -1.0], [0.3, 0.3], rows=2, dense=0)
+    assert problem.solve(400) <= TOLERANCE
+    assert problem.missed() < 1e-11

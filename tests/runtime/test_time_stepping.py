@@ -136,11 +136,14 @@ def test_a_table_shares_its_weight_among_four_legs() -> None:
     assert still.stepped is not None and still.stepped.residual < 1e-11
     np.testing.assert_allclose(still.q[-1], at, atol=1e-12)
     forces = sum(still.contacts[f"leg_{k}"].force[-1] for k in range(4))
-    np.testing.assert_allclose(forces, [10 * G, -10, -3], atol=1e-9)
+    np.testing.assert_allclose(forces, [10 * G, -10, -3], atol=1e-12)
+    arms = np.array([[x, y, -0.7] for x, y in legs])
+    each = np.array([still.contacts[f"leg_{k}"].force[-1] for k in range(4)])[:, [1, 2, 0]]  # along the axes
+    np.testing.assert_allclose(np.cross(arms, each).sum(axis=0), 0, atol=1e-11)
     shoved = module.simulate((0, 0.5), q=at, u=[1, 0.5, 0, 0, 0, 0.3], method="moreau", step=1e-2)
     pushed = sum(shoved.contacts[f"leg_{k}"].impulse[-1] for k in range(4))
     gained = 10 * (shoved.u[-1, :3] - shoved.u[0, :3]) - 10 * 0.5 * np.array([1.0, 0.3, -G])
-    np.testing.assert_allclose(pushed[[1, 2, 0]], gained, atol=1e-9)  # momentum
+    np.testing.assert_allclose(pushed[[1, 2, 0]], gained, atol=1e-12)  # momentum
     assert shoved.stepped is not None and shoved.stepped.residual < 1e-11 and shoved.stepped.depth < 1e-11
 
 

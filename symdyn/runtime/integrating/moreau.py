@@ -49,8 +49,9 @@ MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES = 20_000, 60, 30
 ACCEPTED = 1e-6
 # The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
 FEW = 40
-GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 1e-6, 1e-7, 1.0
-GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 40, 3, 2
+GROUP_DENSE = 240
+GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 5e-7, 1e-7, 1.0
+GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 300, 2, 2
 # Residuals above this many tolerances are reported.
 REPORTED = 1e3
 
@@ -263,13 +264,13 @@ class Stepper:
         groups = metadata.contact_groups
         self.record = record = Moreau(n_q=sizes.q, n_u=sizes.u, n_x=n_x, n_in=n_in, n_given=n_given, n_rows=n_rows)
         self._frames(n_x, n_in)
-        most, entries = n_given, n_rows * sizes.u
+        most, entries = n_given, n_given * sizes.u
         if groups:
             add_groups(module, record, memory)
             most += room_of(groups)
-            entries += 6 * n_speeds(groups) * room_of(groups)
+            entries += 2 * n_speeds(groups) * room_of(groups)
         many = record.n_bodies > FEW
-        self.cones: Cones = cones(memory, sizes.u, most, entries, 0 if many else min(MOST_DENSE, 3 * most))
+        self.cones: Cones = cones(memory, sizes.u, most, entries, min(GROUP_DENSE if many else MOST_DENSE, 3 * most))
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.backend.c_records import fields_of
+from symdyn.backend.c_records import codes_of, fields_of
 from symdyn.runtime.building.library import Frame
 
 if TYPE_CHECKING:
     from symdyn.runtime.building.library import CUnit
 
+# Sweeps whose changes are combined.
+DEPTH = codes_of("runtime/cones_type.h")["CONES_DEPTH"]
 # Rows of a contact problem up to which a dense matrix is factorized.
 MOST_DENSE = 360
 
@@ -79,12 +81,13 @@ class Memory:
 
 
 def cones(memory: Memory, n_u: int, most: int, most_entries: int, dense: int) -> Cones:
-    """A record for up to `most` contacts of three rows, with `most_entries` nonzero entries in all rows; dense: rows of a matrix
-    that is factorized."""
+    """A record for up to `most` contacts of three rows, with `most_entries` columns in all; dense: rows of a matrix that is
+    factorized."""
     record = Cones(n_u=n_u, most=most, most_entries=most_entries, most_dense=dense)
-    memory.put(record, np.dtype("long"), first=most + 1, entry=3 * most + 1, speed=most_entries, active=dense)
-    rows = dict.fromkeys(("free", "P", "w", "kept", "step", "before"), 3 * most)
-    memory.put(record, float, along=most_entries, answer=most_entries, friction=most, d_n=most, d_t=most, block=9 * most, du=n_u,
+    memory.put(record, np.dtype("long"), first=most + 1, entry=most + 1)
+    rows = dict.fromkeys(("free", "P", "w", "kept", "step", "before", "change", "lead"), 3 * most)
+    rows |= dict.fromkeys(("along", "answer"), 3 * (most_entries + 1)) | {"history": 2 * DEPTH * 3 * most}
+    memory.put(record, float, friction=most, d_n=most, d_t=most, block=9 * most, du=n_u,
                dense=dense * dense, **rows)
-    memory.put(record, np.intc, state=most, bounded=most)
+    memory.put(record, np.intc, speed=most_entries + 1, state=most, bounded=most)
     return record

@@ -159,36 +159,36 @@ static double symdyn_pair_speed(const symdyn_moreau *s, long a, long b, const do
     return sum;
 }
 
-// The entries of one row that belong to one of its bodies. Returns the place behind them.
-static long symdyn_pair_entries(const symdyn_moreau *s, symdyn_cones *c, long e, long body, const double *six, double sign) {
+// The columns of m rows that belong to one of the bodies of a pair, which touches along the normal. Returns the place behind
+// them.
+static long symdyn_pair_columns(
+    const symdyn_moreau *s, symdyn_cones *c, long e, long body, const double *basis, double arm, double sign, int m) {
     const int n = s->n_speeds;
     const double *B = symdyn_sphere(s, body) + 10, *T = s->response + 6 * n * body;
+    double six[18] = {0.0};
+    for (int k = 0; k < m; k++) symdyn_wrench(basis, arm, basis + 3 * k, six + 6 * k);
     for (int i = 0; i < n; i++) {
-        double along = 0.0, answer = 0.0;
-        for (int k = 0; k < 6; k++) {
-            along += six[k] * B[n * k + i];
-            answer += six[k] * T[n * k + i];
+        double any = 0.0;
+        for (int k = 0; k < 3; k++) {
+            double along = 0.0, answer = 0.0;
+            for (int l = 0; l < 6; l++) {
+                along += six[6 * k + l] * B[n * l + i];
+                answer += six[6 * k + l] * T[n * l + i];
+            }
+            c->along[3 * e + k] = sign * along;
+            c->answer[3 * e + k] = sign * answer;
+            any += fabs(along) + fabs(answer);
         }
-        if (along == 0.0 && answer == 0.0) continue;
-        c->speed[e] = s->speed_of[n * body + i];
-        c->along[e] = sign * along;
-        c->answer[e++] = sign * answer;
+        c->speed[e] = (int)s->speed_of[n * body + i];
+        if (any > 0.0) e++;
     }
     return e;
 }
 
 // Append the rows of a pair, along the normal alone or with its tangents.
 static void symdyn_pair_rows(const symdyn_moreau *s, symdyn_cones *c, long a, long b, const double *basis, int m) {
-    long r = c->first[c->n], e = c->entry[r];
-    for (int k = 0; k < m; k++) {
-        double six[6];
-        symdyn_wrench(basis, -symdyn_sphere(s, a)[0], basis + 3 * k, six);
-        e = symdyn_pair_entries(s, c, e, a, six, 1.0);
-        if (b < s->n_bodies) {
-            symdyn_wrench(basis, symdyn_arm(s, a, b), basis + 3 * k, six);
-            e = symdyn_pair_entries(s, c, e, b, six, -1.0);
-        }
-        c->entry[++r] = e;
-    }
-    c->first[++c->n] = r;
+    long e = symdyn_pair_columns(s, c, c->entry[c->n], a, basis, -symdyn_sphere(s, a)[0], 1.0, m);
+    if (b < s->n_bodies) e = symdyn_pair_columns(s, c, e, b, basis, symdyn_arm(s, a, b), -1.0, m);
+    c->first[c->n + 1] = c->first[c->n] + m;
+    c->entry[++c->n] = e;
 }

@@ -112,19 +112,20 @@ static long symdyn_rows(const symdyn_moreau *s, long i) {
 // Append the first m rows of a contact with a name.
 static void symdyn_given_rows(const symdyn_moreau *s, symdyn_cones *c, long contact, long m) {
     const double *J = s->direction, *answer = J + s->n_rows * s->n_u;
-    long r = c->first[c->n], e = c->entry[r];
-    for (long k = 0; k < m; k++) {
-        const long row = s->given_first[contact] + k;
-        for (int i = 0; i < s->n_u; i++) {
-            const double along = J[row * s->n_u + i], back = answer[i * s->n_rows + row];
-            if (along == 0.0 && back == 0.0) continue;
-            c->speed[e] = i;
-            c->along[e] = along;
-            c->answer[e++] = back;
+    const long row = s->given_first[contact];
+    long e = c->entry[c->n];
+    for (int i = 0; i < s->n_u; i++) {
+        double any = 0.0;
+        for (long k = 0; k < 3; k++) {
+            c->along[3 * e + k] = k < m ? J[(row + k) * s->n_u + i] : 0.0;
+            c->answer[3 * e + k] = k < m ? answer[i * s->n_rows + row + k] : 0.0;
+            any += fabs(c->along[3 * e + k]) + fabs(c->answer[3 * e + k]);
         }
-        c->entry[++r] = e;
+        c->speed[e] = i;
+        if (any > 0.0) e++;
     }
-    c->first[++c->n] = r;
+    c->first[c->n + 1] = c->first[c->n] + m;
+    c->entry[++c->n] = e;
 }
 
 // J and M^-1 J^T of the contacts that were found, or of their normals alone, at (t, x). Bases turn to the normals there.
@@ -278,16 +279,18 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
             failed = symdyn_gaps(s, t + h, next);
             if (failed) return failed;
             for (long i = 0; i < c->n; i++) {
-                double w[3], basis[9];
+                double w[3], kicked[3], basis[9];
                 const long r = c->first[i], m = c->first[i + 1] - r;
                 for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
                 symdyn_contact_now(s, i, m, basis, w);
-                for (long k = 0; k < m; k++) c->free[r + k] = w[k] - symdyn_cones_along(c, r + k, kick);
+                symdyn_cones_along(c, i, kick, kicked);
+                for (long k = 0; k < m; k++) c->free[r + k] = w[k] - kicked[k];
                 if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
             }
             symdyn_impulses(s, c, h);
             for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
         }
+        const double last = off;
         off = 0.0;
         double size = 0.0;
         for (int i = 0; i < s->n_x; i++) {
@@ -298,7 +301,8 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
         s->n_rounds++;
         if (!(size <= 1e300)) return SYMDYN_MOREAU_NOT_FINITE;
         const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
-        if (round && off <= noise) return 0;
+        const int nearer = off < 0.25 * last && off > 1e-15 * size;  // beyond what is noise in general
+        if (round && off <= noise && !nearer) return 0;
         if (round + 1 == most && off > accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
     }
     return 0;
@@ -400,14 +404,20 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     failed = symdyn_rounds(s, c, t, h, x, end);  // without contacts: what they are looked for with
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
-    for (int pass = 0, added = 1; added; pass++) {
+    int added = 0;
+    failed = symdyn_gaps(s, t, x);
+    if (!failed) failed = symdyn_add(s, c, &added);  // what touches already
+    if (failed) return failed;
+    for (int pass = 0, more = 1; more; pass++) {
         failed = symdyn_gaps(s, t + 0.5 * h, guess);
-        if (!failed) failed = symdyn_add(s, c, &added);
+        if (!failed) failed = symdyn_add(s, c, &more);
+        added |= more;
         if (!failed && added && pass < s->most_passes) {
             failed = symdyn_begin(s, t, x);
             if (!failed) failed = symdyn_rounds(s, c, t, h, x, end);
-        } else {
             added = 0;
+        } else {
+            more = 0;
         }
         if (failed) return failed;
         for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
