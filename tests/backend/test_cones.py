@@ -124,7 +124,7 @@ def test_sweeps_alone_reach_the_laws_where_a_matrix_has_no_room() -> None:
 
 
 def test_more_contacts_stick_than_the_speeds_allow() -> None:
-    """A body of two speeds that creeps in a wedge of two walls, against which it would stick: one of them lets it slip at last."""
+    """A body of two speeds that creeps in a wedge of two walls, where it would stick to both: one lets it slip at last."""
     walls = [np.array([np.cos(a), np.sin(a)]) for a in (np.radians(89), np.radians(91))]
     J = np.array([row for n in walls for row in (n, [n[1], -n[0]])])
     problem = Problem(J, J @ [1e-4, -1.0], [0.3, 0.3], rows=2, dense=0)

@@ -93,7 +93,7 @@ def behind(tree: Tree, k: int, twist: np.ndarray, blocks: Callable[[int], tuple[
 
 def places(row: np.ndarray) -> frozenset[int]:
     """Where a row is not zero by structure."""
-    return frozenset(k for k, e in enumerate(row) if not is_zero(e))
+    return frozenset(np.flatnonzero(row != 0).tolist())  # a node is not equal to a number
 
 
 class _Search:

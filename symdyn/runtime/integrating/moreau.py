@@ -181,8 +181,9 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
         if request.times[0] > request.span[0]:
             rows, times, done_at = rows[1:], times[1:], done_at[1:]
     record = stepper.record
-    touched, done = stepper.touched(), np.array(done_at, dtype=int)
-    stepped = Stepped(np.array(stepper.t), np.array(stepper.h), done, touched, _losses(module, touched, len(stepper.h))[done],
+    touched, reached = stepper.touched(), np.array(done_at, dtype=int)
+    stepped = Stepped(np.array(stepper.t), np.array(stepper.h), reached, touched,
+                      _losses(module, touched, len(stepper.h))[reached],
                       record.worst_residual, record.worst_depth)
     doubts = [stepper.doubt()] if status >= 0 else []
     phases, row_phases = _phases(module, request, stepped)
