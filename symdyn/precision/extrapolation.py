@@ -12,11 +12,25 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from symdyn.errors import EvaluationError
+
 Field = Callable[[Any, Sequence[Any]], list[Any]]
+# t, x -> on which side of each kink of the field that is
+Sides = Callable[[Any, Sequence[Any]], Sequence[bool]]
 # t, x, x_dot there, h, number of steps -> x at t + h
 Rule = Callable[[Any, Sequence[Any], Sequence[Any], Any, int], list[Any]]
 MOST_ROWS = 30
 _FIRST_ROWS = 8
+# Kinks that are crossed one after the other without a step between them.
+_MOST_AT_ONCE = 50
+
+
+class NotFinite(EvaluationError):
+    """A field gives what is no finite number."""
+
+
+class _Beyond(Exception):
+    """A step goes across a kink."""
 
 
 @dataclass(frozen=True)
@@ -27,31 +41,45 @@ class Run:
     n_steps: int
     n_rejected: int
     n_evaluations: int
+    kinks: tuple[Any, ...] = ()  # times at which they were crossed
 
 
 @dataclass(frozen=True)
 class _Step:
-    """A trial step: its end, the errors of its rows, relative to the tolerance, and whether the last of them is small enough."""
+    """A trial step: its end, the errors of its rows, relative to the tolerance, whether the last of them is small enough, and
+    whether it goes across a kink."""
 
     x: list[Any]
     errors: list[Any]
     good: bool
+    beyond: bool = False
 
 
 def integrate(field: Field, span: tuple[Any, Any], x: Sequence[Any], tolerance: Any, groups: Sequence[slice], context: Any,
-              corrected: Callable[[Any, list[Any]], list[Any]] = lambda t, x: x, rule: Rule | None = None) -> Run:
+              corrected: Callable[[Any, list[Any]], list[Any]] = lambda t, x: x, rule: Rule | None = None,
+              sides: Sides | None = None) -> Run:
     """x at the end of the span for x_dot = field(t, x).
 
     tolerance   of the local error of a step, relative to the largest entry of each of the groups of x
     context     of mpmath; it should have ten digits more than the tolerance
     corrected   what is done to the state after every step
     rule        the midpoint rule of this field, where there is a faster one than `midpoint`
+    sides       where the field has kinks: no step goes from one side to another but one that is shorter than the tolerance, so
+                that kinks are located to its digits; the rule is then `midpoint`
     Raises ArithmeticError where x_dot is not finite, or no step is small enough.
     """
-    rule = rule or partial(midpoint, field)
     t, end = span
     x, h = list(x), (end - t) / 100
-    rows, made, rejected, evaluations = _FIRST_ROWS, 0, 0, 0
+    here = None if sides is None else sides(t, x)
+
+    def watched(t: Any, x: Sequence[Any]) -> list[Any]:
+        if sides is not None and sides(t, x) != here:
+            raise _Beyond
+        return field(t, x)
+
+    rule = partial(midpoint, watched) if sides is not None else rule or partial(midpoint, field)
+    rows, made, rejected, evaluations, at_once = _FIRST_ROWS, 0, 0, 0, 0
+    kinks: list[Any] = []
     while t < end:
         h = min(h, end - t)
         begin = field(t, x)
@@ -59,29 +87,49 @@ def integrate(field: Field, span: tuple[Any, Any], x: Sequence[Any], tolerance: 
             raise ArithmeticError(f"x_dot is not finite at t = {context.nstr(t, 10)}")
         step = _extrapolate(rule, t, x, begin, h, rows + 2, tolerance, groups, context)
         evaluations += 1 + sum(2 * k + 1 for k in range(len(step.errors) + 1))
-        if step.good:
-            t = end if h == end - t else t + h
-            x = corrected(t, step.x)
-            made += 1
-        else:
+        beyond = step.beyond or (step.good and sides is not None and sides(t + h, step.x) != here)
+        least = (end - span[0]) * tolerance
+        if beyond:
             rejected += 1
-        grown, rows = _next(step.errors, h, rows, step.good)
-        h = grown if step.good else min(grown, h / 2)
-        if not h > (end - span[0]) * tolerance:
+            h /= 2
+            if sides is not None and h <= least and at_once < _MOST_AT_ONCE:
+                t, x = t + h, corrected(t + h, [a + h * f for a, f in zip(x, begin, strict=True)])
+                if sides(t, x) != here:
+                    here = sides(t, x)
+                    kinks.append(t)
+                at_once += 1
+                h = 2 * least
+        else:
+            grown, rows = _next(step.errors, h, rows, step.good)
+            if step.good:
+                t, x = end if h == end - t else t + h, corrected(t + h, step.x)
+                made, at_once, h = made + 1, 0, grown
+            else:
+                rejected, h = rejected + 1, min(grown, h / 2)
+        if t < end and not h > least:
             raise ArithmeticError(f"the step size vanishes at t = {context.nstr(t, 10)}")
-    return Run(x, made, rejected, evaluations)
+    return Run(x, made, rejected, evaluations, tuple(kinks))
 
 
 def _extrapolate(rule: Rule, t: Any, x: Sequence[Any], begin: Sequence[Any], h: Any, most: int, tolerance: Any,
                  groups: Sequence[slice], context: Any) -> _Step:
     """Rows of the tableau until the last two entries of one agree."""
-    above: list[list[Any]] = [rule(t, x, begin, h, 2)]
+    above: list[list[Any]] = []
     errors: list[Any] = []
-    for j in range(1, min(most, MOST_ROWS)):
-        row = [rule(t, x, begin, h, 2 * (j + 1))]
+    for j in range(min(most, MOST_ROWS)):
+        try:
+            row = [rule(t, x, begin, h, 2 * (j + 1))]
+        except NotFinite:  # the step is too large
+            errors.append(math.inf)
+            break
+        except _Beyond:
+            return _Step(list(x), errors, False, True)
         for k in range(j):
             divisor = 1 / (context.mpf(j + 1)**2 / context.mpf(j - k)**2 - 1)
             row.append([a + (a - b) * divisor for a, b in zip(row[k], above[k], strict=True)])
+        if j == 0:
+            above = row
+            continue
         errors.append(_error(row[j], row[j - 1], x, begin, h, groups) / tolerance)
         if errors[-1] <= 1 and j > 1:
             return _Step(row[j], errors, True)

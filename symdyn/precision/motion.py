@@ -11,7 +11,7 @@ import mpmath
 
 from symdyn.formulation.equations import Equations
 from symdyn.precision import quad
-from symdyn.precision.extrapolation import Rule, integrate, midpoint
+from symdyn.precision.extrapolation import Rule, Sides, integrate, midpoint
 from symdyn.precision.program import Lost, decimal, program
 
 # Decimal digits of a stored motion's local errors, and how many more the second run has, which shows convergence.
@@ -23,6 +23,7 @@ _ROUNDS = 8
 HOW = ("Gragg-Bulirsch-Stoer extrapolation of the accelerations on the tape {}, projected onto the constraints after "
        "every step; parameters and start are the catalogue's decimal numbers, the start projected; made by "
        "symdyn bench extended")
+KINKS = "; steps end at the kinks of the right-hand side, {} of them, located to the digits of the tolerance"
 WITH = ("with mpmath", f"in C with numbers of {quad.BITS} binary digits")
 
 
@@ -32,6 +33,7 @@ class Motion:
 
     q, u, u_dot   coordinates, speeds, accelerations; lam: multipliers, (n_c,)
     n_steps, n_evaluations   what it took; digits: of the tolerance
+    kinks   times at which kinks were crossed
     """
 
     t: Any
@@ -42,6 +44,7 @@ class Motion:
     digits: int
     n_steps: int
     n_evaluations: int
+    kinks: tuple[Any, ...] = ()
 
 
 class Precise:
@@ -72,6 +75,19 @@ class Precise:
     def __call__(self, name: str, t: Any, x: Sequence[Any]) -> list[Any]:
         """A quantity at a state, its entries one after the other; where its divisors vanish the equations for that case."""
         return self._program(name)([t, *x])
+
+    def sides(self) -> Sides | None:
+        """On which side of its kinks the right-hand side is: of events whose reset changes nothing, which end steps. None where
+        there are none."""
+        places = [k for k, event in enumerate(self.equations.events) if event.reset and all(a == b for a, b in event.reset)]
+        if not places:
+            return None
+
+        def sides(t: Any, x: Sequence[Any]) -> list[bool]:
+            values = self("events", t, x)
+            return [bool(values[k] > 0) for k in places]
+
+        return sides
 
     def _program(self, name: str) -> Callable[[Sequence[Any]], list[Any]]:
         if name not in self._programs:
@@ -147,10 +163,10 @@ def motion(equations: Equations, end: Any, digits: int = DIGITS, compiled: bool 
     n_q, n_u = precise.n_q, precise.n_u
     run = integrate(lambda t, x: precise("rhs", t, x), (zero, last), precise.projected(zero, precise.start),
                     context.mpf(10) ** -digits, [slice(0, n_q), slice(n_q, n_q + n_u), slice(n_q + n_u, None)], context,
-                    precise.projected, precise.rule())
+                    precise.projected, precise.rule(), precise.sides())
     lam = precise("lam", last, run.x) if precise.n_c else []
     return Motion(last, run.x[:n_q], run.x[n_q:n_q + n_u], precise("rhs", last, run.x)[n_q:n_q + n_u], lam, digits, run.n_steps,
-                  run.n_evaluations)
+                  run.n_evaluations, run.kinks)
 
 
 def agreement(a: Motion, b: Motion) -> float:
@@ -169,7 +185,8 @@ def record(equations: Equations, end: Any, digits: int = DIGITS) -> dict[str, An
     differ = agreement(coarse, fine)
     held = min(digits, int(-mpmath.log10(max(differ, 1e-50))))
     text = {"q": fine.q, "q_dot": fine.u, "q_ddot": fine.u_dot, "lambda": fine.lam}
-    return {"source": HOW.format(WITH[compiled]), "t": float(end), "digits": held,
+    source = HOW.format(WITH[compiled]) + (KINKS.format(len(fine.kinks)) if fine.kinks else "")
+    return {"source": source, "t": float(end), "digits": held,
             "tolerances": [f"1e-{n}" for n in (digits, digits + MORE)], "runs_differ_by": float(f"{differ:.2g}"),
             "steps": [coarse.n_steps, fine.n_steps], "evaluations": [coarse.n_evaluations, fine.n_evaluations],
             **{name: [mpmath.nstr(e, held, min_fixed=-5, max_fixed=30, strip_zeros=False) for e in values]

@@ -15,6 +15,7 @@ from mpmath import libmp
 
 from symdyn.errors import CompileError, EvaluationError, SymdynError
 from symdyn.folders import templates_folder
+from symdyn.precision.extrapolation import NotFinite
 from symdyn.precision.program import Lost
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler, find_compiler
@@ -243,7 +244,7 @@ def from_bytes(raw: bytes) -> list[tuple[int, int, int, int]]:
         word = int.from_bytes(raw[k:k + 16], "little")
         place, fraction = (word >> (BITS - 1)) & 0x7fff, word & _FRACTION
         if place == 2 * _BIAS + 1:
-            raise EvaluationError("the equations give what is no finite number")
+            raise NotFinite("the equations give what is no finite number")
         mantissa = fraction | (1 << (BITS - 1)) if place else 0
         value = libmp.from_man_exp(mantissa, place - _BIAS - BITS + 1)
         values.append(libmp.mpf_neg(value) if word >> 127 else value)

@@ -14,7 +14,7 @@ from symdyn.cli import main
 from symdyn.lab import extended
 from symdyn.lab.extended import known
 from symdyn.lab.loop_cases import REFERENCE
-from symdyn.precision.extrapolation import integrate
+from symdyn.precision.extrapolation import NotFinite, integrate
 from symdyn.precision.motion import Precise, agreement, motion
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
@@ -49,6 +49,36 @@ def test_the_method_reaches_its_tolerance(context):
                         context.mpf(10)**-digits, [slice(0, 1), slice(1, 2)], context)
         assert relative(run.x, [context.sin(20), context.cos(20)]) <= 100 * context.mpf(10)**-digits
         assert run.n_evaluations < 6000
+
+
+def test_kinks_are_located_to_all_digits(context):
+    """A ball falls from 1 m onto a spring, k = 900 1/s^2, and leaves it as fast as it came: twice, in closed form."""
+    g, w = context.mpf(10), context.mpf(30)
+    fall, speed = context.sqrt(2 / g), context.sqrt(2 * g)
+    below = 2 * (context.pi / 2 + context.atan(g / (w * speed))) / w
+    end = 3 * fall + below + below / 3
+    run = integrate(lambda t, x: [x[1], -g - w**2 * min(x[0], 0)], (context.mpf(0), end), [context.mpf(1), context.mpf(0)],
+                    context.mpf(10)**-28, [slice(0, 1), slice(1, 2)], context, sides=lambda t, x: [x[0] > 0])
+    phase = w * below / 3
+    assert relative(run.kinks, [fall, fall + below, 3 * fall + below]) <= 1e-25
+    expected = [-g / w**2 * (1 - context.cos(phase)) - speed / w * context.sin(phase),
+                -g / w * context.sin(phase) - speed * context.cos(phase)]
+    assert relative(run.x, expected) <= 1e-25
+    with pytest.raises(ArithmeticError, match="step size vanishes"):  # it is driven back onto the kink from both sides
+        integrate(lambda t, x: [-1 if x[0] > 0 else 1], (context.mpf(0), context.mpf(1)), [context.mpf(1) / 3],
+                  context.mpf(10)**-12, [slice(0, 1)], context, sides=lambda t, x: [x[0] > 0])
+
+
+def test_steps_at_whose_end_nothing_is_finite_are_made_smaller(context):
+    """A stiff spring, over which a long step of the midpoint rule has no finite number; in closed form cos."""
+    def field(t, x):
+        if abs(x[0]) > 10:
+            raise NotFinite("too large")
+        return [x[1], -10**12 * x[0]]
+
+    run = integrate(field, (context.mpf(0), context.mpf("1e-3")), [context.mpf(1), context.mpf(0)], context.mpf(10)**-14,
+                    [slice(0, 1), slice(1, 2)], context)
+    assert abs(run.x[0] - context.cos(1000)) <= 1e-10 and run.n_rejected > 0
 
 
 def test_what_is_not_a_number_is_no_agreement(context):
