@@ -11,7 +11,7 @@ from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.integrating.contact_columns import Switch
 
 G = 9.81
-E, GRAVITY, MU, KINETIC, K = sd.parameters("e g mu kinetic k")
+E, GRAVITY, MU, KINETIC, K, DOWN = sd.parameters("e g mu kinetic k down")
 
 
 @pytest.fixture(scope="module")
@@ -84,9 +84,9 @@ def test_integral_of_a_loss_over_impacts(ball: Any) -> None:
 
 
 def mass_on_ground(space: bool = False, law: str = "newton") -> Any:
-    """A point mass over the ground."""
-    system = sd.System("mass", gravity=[0, 0, -G] if space else [0, -G])
-    system.defaults.update({MU: 0.3, E: 0.0})
+    """A point mass over the ground; in space gravity has a part down along x."""
+    system = sd.System("mass", gravity=[DOWN, 0, -G] if space else [0, -G])
+    system.defaults.update({MU: 0.3, E: 0.0, **({DOWN: 0.0} if space else {})})
     axes = np.eye(3).tolist() if space else np.eye(2).tolist()
     before: Any = system.ground
     for axis, name in zip(axes, "xyz", strict=False):
@@ -176,6 +176,41 @@ def test_mass_in_space_slides_along_its_velocity_until_it_sticks(in_space: Any) 
     assert np.abs(solution.sensitivity["x_dot(0)"][-1, 3:]).max() < 1e-9
     with pytest.raises(EvaluationError, match="contact sole begins or ceases to slip in space"):
         in_space.gradient(sd.Loss(end=sp.Symbol("x")), ["mu"], (0, 2), u={"x_dot": v[0], "y_dot": v[1]})
+
+
+def rest_on_slope() -> dict[str, Any]:
+    """When and where a mass that slides on a slope sticks, and derivatives of the place, in closed form: with w the tangent of
+    half of the angle of its velocity from down the slope on, and m the friction by what pulls it down, the speed is
+    C w^(m - 1) (1 + w^2)/2."""
+    vx, vy, mu, down = symbols = sp.symbols("vx vy mu down", positive=True)
+    m, w = mu * G / down, (sp.sqrt(vx**2 + vy**2) - vx) / vy
+    C = 2 * sp.sqrt(vx**2 + vy**2) / (w ** (m - 1) * (1 + w**2))
+    end = C / (2 * down) * (w ** (m - 1) / (m - 1) + w ** (m + 1) / (m + 1))
+    place = [C**2 / (4 * down) * (w ** (2 * m - 2) / (2 * m - 2) - w ** (2 * m + 2) / (2 * m + 2)),
+             C**2 / (2 * down) * (w ** (2 * m - 1) / (2 * m - 1) + w ** (2 * m + 1) / (2 * m + 1))]
+    by = {"mu": mu, "x_dot(0)": vx, "y_dot(0)": vy, "down": down}
+    return {"end": sp.lambdify(symbols, end), "place": sp.lambdify(symbols, place),
+            **{name: sp.lambdify(symbols, [sp.diff(e, symbol) for e in place]) for name, symbol in by.items()}}
+
+
+SLOPES = [(1.0, -1.0, 1.5), (2.0, -2.0, 1.0), (2.0, 1.0, 1.0), (0.2, -1.0, 1.0)]  # what pulls it down, velocity
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-11])
+@pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)
+def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float, vx: float, vy: float, rtol: float) -> None:
+    """The less pulls it down, the faster its direction turns at the end."""
+    expected, values = rest_on_slope(), (vx, vy, 0.3, down)
+    end = expected["end"](*values)
+    for name in ("x_dot(0)", "y_dot(0)"):
+        names = ["mu", name]
+        run = in_space.simulate((0, 1.2 * end), u=[vx, vy, 0], params={"down": down}, rtol=rtol, sensitivities=names)
+        assert run.contacts["sole"].switches[-1][0] == pytest.approx(end, rel=20 * rtol)
+        np.testing.assert_allclose(run.q[-1, :2], expected["place"](*values), atol=10 * rtol)
+        for one in names:
+            found = expected[one](*values)
+            np.testing.assert_allclose(run.sensitivity[one][-1, :2], found, rtol=0, atol=50 * rtol * np.abs(found).max())
+            assert np.abs(run.sensitivity[one][-1, 2:]).max() < 1e-12
 
 
 def test_motions_without_derivative_stop_with_the_reason(mass: Any) -> None:

@@ -72,6 +72,7 @@ class Switch:
     events   places of the module's events that set its time, with what messages call them; none: its time is given
     made     the state that it makes of another one, at a time, with parameters and inputs, and what is decided on the way
     since    the time since the switch before, s; inputs: over time
+    zero     where slips in space are put along directions: when they are zero, at their begin or end, s
     """
 
     module: Module
@@ -84,6 +85,7 @@ class Switch:
     made: Callable[[float, np.ndarray, np.ndarray, Any], tuple[np.ndarray, Any]]
     since: float
     inputs: Any
+    zero: float | None = None
 
     def moves(self, x: np.ndarray, by: Sequence[str]) -> Moves:
         """Changes (k, n_x) of the state before it, each with one of the parameter or input that it is by, "" of none."""

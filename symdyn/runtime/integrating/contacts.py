@@ -27,6 +27,7 @@ from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.slip_begins import SlipBegins
+from symdyn.runtime.integrating.slip_ends import NOISE, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.stronge import stronge
 
@@ -63,9 +64,6 @@ LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWES
 GRACE = 1e-9
 # A speed, m/s, that no slip comes near: added to the slip it holds the direction of friction.
 HOLDS = 1e30
-# Part of a phase of sliding in space before its end in which errors of sensitivities are not controlled, and a tolerance that no
-# error comes near.
-LAST_STRETCH, ANY = 1e-4, 1e300
 
 
 class Numbers(NamedTuple):
@@ -244,6 +242,11 @@ def run_contacts(module: Module, request: Request, part: Part, method: object = 
     return phases.through()
 
 
+def _without_columns(part: Request) -> Request:
+    n = part.n_state
+    return replace(part, x0=part.x0[:n], atol=part.atol[:n], columns=(), held=(), followed=())
+
+
 class Made(NamedTuple):
     """What was done to the state at a switch: put onto the surfaces of contacts by modes and whether they slip, or, where
     contacts are hit, an impact."""
@@ -346,7 +349,8 @@ class _Phases:
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
         self.closing: set[int] = set()  # at the latest switch
-        self.last_stretch = np.inf  # when the last part of a phase begins, see _towards_sticking
+        self.ends = SlipEnds()  # of the phase
+        self.latest_time = begin  # of a switch that changes the motion
 
     # -- the run
 
@@ -390,6 +394,8 @@ class _Phases:
                     break
                 else:
                     self.x, self.fired = self._slipped(until, self.x)
+                    if until == self.ends.begins and not self.fired:
+                        self.x = self._into_last_stretch(until, self.x)
                 self._count(until - start, until, self.fired)
                 self.t = until
                 if request.max_steps is not None and self.n_steps >= request.max_steps:
@@ -550,9 +556,11 @@ class _Phases:
         p = self._parameters()
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
-        if request.columns and self._in_space() and not held:
-            part = self._towards_sticking(t, part)
-        outcome = self.part(replace(part, first_step=first) if stiff else part, stiff, all(mode == OPEN for mode in self.modes))
+        part, last = replace(part, first_step=first) if stiff else part, t >= self.ends.begins
+        if (request.columns or self.keeps) and self._in_space() and not held and not last:
+            part = self._towards_sticking(t, part, stiff)
+        outcome = self._last_stretch(part) if last and request.columns else self.part(
+            part, stiff, all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
         if times is not None:  # they come in order, after them the state where the run ends
             n, asked = min(len(times), len(rows)), np.zeros(len(times), dtype=bool)
@@ -573,22 +581,62 @@ class _Phases:
         """Whether the direction of a slip changes with the state."""
         return any(mode == SLIDING and record.tangents == 2 for mode, record in zip(self.modes, self.records, strict=True))
 
-    def _towards_sticking(self, t: float, part: Request) -> Request:
-        """A phase of sensitivities in which a contact slips in space. Where it comes to stick derivatives of the direction of
-        friction have no bound: before that a last stretch begins, in which errors of the columns are not controlled. What these
-        do to velocities there is undone when the contact sticks."""
-        n = part.n_state
-        if t >= self.last_stretch:
-            return replace(part, atol=np.append(part.atol[:n], np.full(len(part.x0) - n, ANY)))
-        alone = replace(part, times=None, x0=part.x0[:n], atol=part.atol[:n], columns=(), held=(), followed=())
-        ahead = self.part(alone, False, False)
-        ends = [self.of_event.get(one.event, (0, ""))[1] for one in ahead.happened[-1:]]
-        if not ahead.success or not {"sticks", "turns"}.intersection(ends):
+    def _towards_sticking(self, t: float, part: Request, stiff: bool) -> Request:
+        """A phase in which contacts slip in space, until the last stretch of those that come to stick."""
+        ahead = self.part(replace(_without_columns(part), times=None), stiff, False)
+        if not ahead.success or not ahead.happened:
             return part
-        self.last_stretch = float(ahead.t[-1]) - LAST_STRETCH * (float(ahead.t[-1]) - t)
-        self.until = min(self.until, self.last_stretch)
+        end, x = float(ahead.happened[-1].t), ahead.happened[-1].before
+        at, begin, tolerated, slips = self._numbers(end, x), self._numbers(t, part.x0), {}, {}
+        for k, (mode, record) in enumerate(zip(self.modes, self.records, strict=True)):
+            if mode == SLIDING and record.tangents == 2:
+                tolerated[k] = self._tolerated(end, x, k)
+                if np.linalg.norm(at.slip[self.tangents[k]]) <= NOISE * tolerated[k]:
+                    slips[k] = float(np.linalg.norm(begin.slip[self.tangents[k]]))
+        if not slips:
+            return part
+        self.ends.found(t, end, slips, tolerated)
+        self.until = min(self.until, self.ends.begins)
         wanted = None if part.times is None else part.times[part.times < self.until]
         return replace(part, span=(t, self.until), times=None if wanted is None else np.append(wanted, self.until))
+
+    def _into_last_stretch(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The state where the last stretch begins, its columns without slips across those that come to their end."""
+        before, slip, other = self._parameters(), self._numbers(t, x).slip, copy.copy(self)
+        other.directions = list(self.directions)
+        for k, (mode, record) in enumerate(zip(self.modes, self.records, strict=True)):
+            v = slip[self.tangents[k]]
+            if mode == SLIDING and record.tangents == 2 and v.any():
+                other.directions[k] = v / np.linalg.norm(v)
+        self.ends.held = self._held(other._parameters())
+        held = {k: other.directions[k] for k in self.ends.contacts}
+        return other._realigned(t, x, held, before, self.ends.held, self.ends.ends)
+
+    def _last_stretch(self, part: Request) -> Outcome:
+        """The last stretch: the motion, and its columns with directions of friction that are held."""
+        n, metadata = part.n_state, self.module.metadata
+        outcome = self.part(_without_columns(part), False, False)
+        if not len(outcome.t) or any(metadata.events[one.event].reset for one in outcome.happened):
+            return self.part(part, False, False)
+        t = np.unique([part.span[0], *outcome.t, *[one.t for one in outcome.happened]])
+        columns = part.x0[None, n:]
+        if len(t) > 1:
+            held = replace(part, span=(t[0], t[-1]), times=t, p=self.ends.held, first_step=0.0,
+                           look=None if part.look is None else np.zeros_like(part.look))
+            along = self.part(held, False, False)
+            if not along.success:
+                return along
+            columns = along.x[:, n:]
+        of = lambda times: columns[np.searchsorted(t, times)]
+        happened = [one._replace(before=np.append(one.before[:n], of(one.t)), after=np.append(one.after[:n], of(one.t)))
+                    for one in outcome.happened]
+        return replace(outcome, x=np.hstack([outcome.x, of(outcome.t)]), happened=happened)
+
+    def _held(self, p: np.ndarray) -> np.ndarray:
+        """Parameters with which directions of friction in space are held."""
+        p = p.copy()
+        p[self.place[HOLDING]] = HOLDS
+        return p
 
     def _held_until(self, t: float, x: np.ndarray) -> float:
         """Until when the directions of contacts that begin to slip are held."""
@@ -627,9 +675,7 @@ class _Phases:
                 for name, value in zip(record.sliding, direction, strict=True):
                     p[self.place[name]] = value if mode == SLIDING else 0.0
         p[self.place[SHARED]] = SOFTNESS if self.shared else 0.0
-        if self.begins.directions and HOLDING in self.place:
-            p[self.place[HOLDING]] = HOLDS
-        return p
+        return self._held(p) if self.begins.directions and HOLDING in self.place else p
 
     def _looked_for(self) -> np.ndarray:
         """Events of the user, and those of contacts that their modes can end with."""
@@ -655,15 +701,17 @@ class _Phases:
         """The state after a switch with its sensitivities; located: whether it is where an event happens."""
         if not self.request.columns and not self.keeps:
             return self._switch(t, x, fired, start)
-        p, n, self.last_stretch = self._parameters(), self.request.n_state, np.inf
+        p, n, self.ends = self._parameters(), self.request.n_state, SlipEnds()
         after = self._switch(t, x, fired, start)
         if start:  # changes of the start keep contacts that are closed there on their surfaces
             self.made.append(Made(tuple(self.modes), tuple(self.still)))
-        since = t - self.phases[-1].t if self.phases else self.request.span[1] - t
+        since = t - self.latest_time if self.phases else self.request.span[1] - t
         events = [(self.events[k][what], f"{self.records[k].name}_{what}")
                   for k, what in self._timed(fired).items()] if located else []
         switch = Switch(self.module, t, x[:n].copy(), after[:n].copy(), p, self._parameters(), tuple(events),
                         partial(self._made_again, tuple(self.made)), since, self.request.inputs)
+        if events or start:
+            self.latest_time = t
         if self.keeps:
             self.crossed.append(switch)
         if self.request.columns:
@@ -944,12 +992,15 @@ class _Phases:
     def _slipped(self, t: float, x: np.ndarray) -> tuple[np.ndarray, list[tuple[int, str]]]:
         """The end of a part of a phase that ends where slips have begun: the state, where directions of friction were held with
         slips along these; contacts that stick again before their slip was looked at."""
-        held, self.begins.directions = self.begins.directions, {}
+        held, p = self.begins.directions, self._parameters()
+        self.begins.directions = {}
         if held:
             slip = self._numbers(t, x).slip
             fired = [(k, "sticks") for k, mode in enumerate(self.modes)  # of others, too: nothing looked at their slips
                      if mode == SLIDING and self.directions[k].any() and slip[self.tangents[k]] @ self.directions[k] < 0]
-            return (x, fired) if fired else (self._aligned(t, x, held), [])
+            if fired:
+                return x, fired
+            return self._realigned(t, x, held, p, self._parameters(), min(self.begins.since.values(), default=t)), []
         if self.begins.since:
             at = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], self._parameters()))
             turning: dict[int, float] = {}
@@ -959,6 +1010,33 @@ class _Phases:
                 turning[k] = gain / max(float(np.linalg.norm(at.slip[tangents])), 1e-300)
             self.begins.settled(t, turning)
         return x, []
+
+    def _realigned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray], before: np.ndarray, after: np.ndarray,
+                   zero: float) -> np.ndarray:
+        """The state with slips along directions, and its columns; before, after: parameters, zero: when the slips are zero."""
+        n, request = self.request.n_state, self.request
+        found = self._aligned(t, x, held)
+        if not request.columns and not self.keeps:
+            return found
+        again = partial(self._aligned_again, tuple(self.modes), tuple(self.directions), held)
+        switch = Switch(self.module, t, x[:n].copy(), found[:n].copy(), before, after, (), again,
+                        request.span[1] - request.span[0], request.inputs, zero)
+        if self.keeps:
+            self.crossed.append(switch)
+        if request.columns:
+            try:
+                found[n:] = switch.along(switch.moves(x[n:].reshape(-1, n), request.columns))[1].ravel()
+            except EvaluationError as error:
+                raise _Stop(str(error)) from None
+        return found
+
+    def _aligned_again(self, modes: Sequence[str], directions: Sequence[np.ndarray], held: Mapping[int, np.ndarray], t: float,
+                       x: np.ndarray, p: np.ndarray, inputs: Any) -> tuple[np.ndarray, Any]:
+        """The state with slips along directions that is made of another one."""
+        other = copy.copy(self)
+        other.request = replace(self.request, p=p, inputs=inputs)
+        other.latest_numbers, other.evaluators, other.modes, other.directions = None, {}, list(modes), list(directions)
+        return other._aligned(t, x, held), None
 
     def _aligned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray]) -> np.ndarray:
         """The state after the impulses by which friction that follows the slip differs from friction along held directions:
