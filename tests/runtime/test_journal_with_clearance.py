@@ -1,5 +1,7 @@
 """A pin in a bore, and a slider-crank whose piston has a journal with clearance."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def test_pin_rests_in_its_bore(space: bool) -> None:
         body = system.add_body("pin", mass=2.0)
         axis = [0, 0, 1] if space else [0, 1]
         system.add_joint(sd.Prismatic("height", system.ground, body, axis=axis, coordinate=sd.coordinates("h")))
-        yielding = {"law": law, "compliance": C.Compliance(1e8)} if law == "compliant" else {}
+        yielding: Any = {"law": law, "compliance": C.Compliance(1e8)} if law == "compliant" else {}
         system.add_contact(sd.Contact("bore", body, system.ground, shape=(C.Sphere(0.009), C.Bore(0.01)), **yielding))
         module = system.compile(backend="numpy")
         if law == "rigid":

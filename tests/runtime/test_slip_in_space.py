@@ -1,6 +1,7 @@
 """How contacts in space begin to slip and come to stick, with friction whose direction turns."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import symdyn as sd
-from symdyn.errors import EvaluationError
 from symdyn.runtime.module import Module
 
 MASSES, PRESSED = np.array([6.0, 5.0]), 30.0  # kg along x and along y; N
@@ -20,14 +20,15 @@ def pushed(t: float) -> np.ndarray:
     return np.array([18 * np.sin(1.3 * t), 9 * np.cos(0.7 * t) + 3 * np.sin(2.1 * t)])
 
 
-def skid(friction: object) -> Module:
-    """A body with different masses along x and y."""
+def skid(friction: object, m1: object = 1, m2: object = 2, pushes: object = 18) -> Module:
+    """A body with different masses along x and y; m1, m2: of its carriers, pushes: along x, N."""
     system, t = sd.System("skid", gravity=[0, 0, -10]), sd.t
-    bodies = [system.add_body(name, mass=mass, inertia=[1, 1, 1]) for name, mass in zip("abc", (1, 2, 3), strict=True)]
+    system.defaults.update({s: value for s, value in ((m1, 1), (m2, 2), (pushes, 18)) if isinstance(s, sp.Symbol)})
+    bodies = [system.add_body(name, mass=mass, inertia=[1, 1, 1]) for name, mass in zip("abc", (m1, m2, 3), strict=True)]
     carriers = [system.ground, *bodies[:2]]
     for body, carrier, q, axis in zip(bodies, carriers, sd.coordinates("x y z"), np.eye(3, dtype=int), strict=True):
         system.add_joint(sd.Prismatic(f"along_{q.name}", carrier, body, axis=axis, coordinate=q))
-    system.add_joint_force("along_x", 18 * sp.sin(1.3 * t))
+    system.add_joint_force("along_x", pushes * sp.sin(1.3 * t))
     system.add_joint_force("along_y", 9 * sp.cos(0.7 * t) + 3 * sp.sin(2.1 * t))
     system.add_contact(sd.Contact("sole", bodies[2], system.ground, friction=friction))
     return system.compile()
@@ -91,7 +92,7 @@ def test_a_disc_that_sticks_and_slips_on_its_edge_is_as_accurate_as_its_toleranc
         np.testing.assert_allclose(run.q[-1], runs[-1].q[-1], rtol=0, atol=bound)
 
 
-def test_derivatives_go_through_the_beginning_of_a_slip_and_gradients_are_rejected() -> None:
+def test_derivatives_go_through_the_beginning_of_a_slip() -> None:
     """A mass slips down the slope from rest, by (|g_t| - mu g_n) t^2/2 along the tangential gravity g_t."""
     mu, system, carrier = sd.parameters("mu"), sd.System("slope", gravity=[3, 1, -9]), None
     system.defaults[mu] = 0.1
@@ -104,5 +105,52 @@ def test_derivatives_go_through_the_beginning_of_a_slip_and_gradients_are_reject
     solution = module.simulate((0, 1), rtol=1e-11, sensitivities=["mu"])
     np.testing.assert_allclose(solution.q[-1, :2], along * (np.sqrt(10) - 0.9) / 2, rtol=0, atol=1e-10)
     np.testing.assert_allclose(solution.sensitivity["mu"][-1, :2], -9 / 2 * along, rtol=0, atol=1e-8)
-    with pytest.raises(EvaluationError, match="contact sole begins or ceases to slip in space"):
-        module.gradient(sd.Loss(end=sp.Symbol("x")), ["mu"], (0, 1))
+    found = module.gradient(sd.Loss(end=sp.Symbol("x"), integral=sp.Symbol("x") ** 2), ["mu"], (0, 1), rtol=1e-11)
+    way = along[0] * (np.sqrt(10) - 0.9) / 2
+    assert abs(found.value - way - way**2 / 5) < 1e-11
+    assert abs(found["mu"] + 9 / 2 * along[0] * (1 + 2 * way / 5)) < 1e-10
+
+
+@pytest.mark.parametrize("kinetic", [0.4, 0.3])
+def test_derivatives_of_a_skid_that_slips_and_sticks_are_differences_of_its_motion(kinetic: float) -> None:
+    """By its masses and by what pushes it; friction turns other masses along x and y, and the skid slips twice by 0.4."""
+    m1, m2, f = masses = sd.parameters("m1 m2 f")
+    module = skid((0.4, kinetic), *masses)
+    end, values = 5.0, {m1: 1.0, m2: 2.0, f: 18.0}
+    names = [m.name for m in masses]
+    run = module.simulate((0, end), rtol=1e-10, sensitivities=names)
+    assert len(run.contacts["sole"].switches) == (4 if kinetic == 0.4 else 2)
+    found = module.gradient(sd.Loss(end=sp.Symbol("x")), names, (0, end), rtol=1e-10)
+    for m, value in values.items():
+        h = 1e-4 * value
+        x = [module.simulate((0, end), rtol=1e-12, params={m: value + k * h})["x"][-1] for k in (-2, -1, 1, 2)]
+        difference = (x[0] - 8 * x[1] + 8 * x[2] - x[3]) / (12 * h)
+        assert abs(run.sensitivity[m][-1, 0] - difference) < 5e-9
+        assert abs(found[m] - difference) < 5e-9
+
+
+def test_derivatives_of_where_a_table_comes_to_rest_that_slides_and_spins() -> None:
+    """On three legs, which slide in different directions and stick at the same time, whatever changes."""
+    mu, system = sd.parameters("mu"), sd.System("table", gravity=[0, 0, -9.81])
+    system.defaults[mu] = 0.3
+    top = system.add_body("top", mass=2.0, inertia=[0.02, 0.03, 0.04])
+    system.add_joint(sd.Free("free", system.ground, top, orientation=sd.EulerParameters()))
+    for k, (x, y) in enumerate([(0.2, 0.1), (-0.2, 0.1), (0, -0.15)]):
+        leg = sd.contacts.Point([x, y, -0.05])
+        system.add_contact(sd.Contact(f"leg_{k}", top, system.ground, shape=leg, friction=mu))
+    module, u = system.compile(), np.array([1.0, 0.3, 0, 0, 0, 2.0])
+    x, forward, spin = "q_free_1", "q_free_1_dot", "omega_z_free"
+    asked: dict[str, Any] = {"t": (0, 0.8), "q": [0, 0, 0.05, 1, 0, 0, 0]}
+    names = ["mu", f"{forward}(0)", f"{spin}(0)"]
+    run = module.simulate(**asked, u=u, rtol=1e-9, sensitivities=names)
+    assert [run.contacts[f"leg_{k}"].mode[-1] for k in range(3)] == ["sticking"] * 3
+    found = module.gradient(sd.Loss(end=sp.Symbol(x)), names, **asked, u=u, rtol=1e-9)
+    for name, entry in zip(names, (None, 0, 5), strict=True):
+        ends = []
+        for k in (-2, -1, 1, 2):
+            moved = u + (0 if entry is None else 1e-4 * k * np.eye(6)[entry])
+            params = {"mu": 0.3 + 1e-4 * k} if entry is None else None
+            ends.append(module.simulate(**asked, u=moved, params=params, rtol=1e-11)[x][-1])
+        difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / 12e-4
+        assert abs(run.sensitivity[name][-1, 0] - difference) < 1e-9
+        assert abs(found[name] - difference) < 1e-9

@@ -70,8 +70,11 @@ class Switch:
     """A switch of contacts: when, the states (n_x,) and the parameters, which hold the modes, before and after it.
 
     events   places of the module's events that set its time, with what messages call them; none: its time is given
-    made     the state that it makes of another one, at a time, with parameters and inputs, and what is decided on the way
+    made     the state that it makes of another one, at a time, with parameters and inputs, and what is decided on the way; None:
+             the state stays as it is, and only what directions are counted from changes
     since    the time since the switch before, s; inputs: over time
+    stuck    whether it ends the slips of all contacts: the velocity is continuous, and what friction made of changes along slips
+             is undone, so that the state after it does not depend on when that happened
     zero     where slips in space are put along directions: when they are zero, at their begin or end, s
     """
 
@@ -82,10 +85,11 @@ class Switch:
     p_before: np.ndarray
     p_after: np.ndarray
     events: tuple[tuple[int, str], ...]
-    made: Callable[[float, np.ndarray, np.ndarray, Any], tuple[np.ndarray, Any]]
+    made: Callable[[float, np.ndarray, np.ndarray, Any], tuple[np.ndarray, Any]] | None
     since: float
     inputs: Any
     zero: float | None = None
+    stuck: bool = False
 
     def moves(self, x: np.ndarray, by: Sequence[str]) -> Moves:
         """Changes (k, n_x) of the state before it, each with one of the parameter or input that it is by, "" of none."""
@@ -100,6 +104,8 @@ class Switch:
         """How the time of the switch moves, (k,), and the state after it at a given time, (k, n_x), with changes before it at a
         given time. Raises EvaluationError where they have no derivative.
         """
+        if self.made is None:
+            return np.zeros(len(moves.x)), moves.x.copy()
         slope, slope_after = (self._rhs(x, p) for x, p in ((self.before, self.p_before), (self.after, self.p_after)))
         later = self._later(moves, slope) if self.events else np.zeros(len(moves.x))
         moved = moves._replace(t=later, x=moves.x + np.outer(later, slope))
@@ -118,6 +124,8 @@ class Switch:
             if abs(rate) <= bent:
                 raise EvaluationError(f"{name} at t = {self.t:.9g} s grazes: its quantity has no rate, so that its time has no "
                                       "derivative; change the start or parameters, or leave sensitivities out")
+        if self.stuck:
+            return np.zeros(len(moved))
         later: np.ndarray = -moved / rates
         names, first = [name for _, name in self.events], later[:, 0]
         apart = np.abs(later - later[:, :1]).max(axis=1) > TOGETHER * np.abs(later).max(axis=1) + NOISE * self.since / moves.sizes
@@ -143,10 +151,12 @@ class Switch:
 
     def _state(self) -> Function:
         """The state after it, as long as the same is decided."""
-        decided = self.made(self.t, self.before, self.p_before, self.inputs)[1]
+        made = self.made
+        assert made is not None
+        decided = made(self.t, self.before, self.p_before, self.inputs)[1]
 
         def state(t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> np.ndarray:
-            found, other = self.made(t, x, p, inputs)
+            found, other = made(t, x, p, inputs)
             return found if other == decided else np.full_like(found, np.nan)
         return state
 
@@ -165,7 +175,8 @@ class Switch:
                                        Shifted(self.inputs, k * h * one.inputs)) for k in (1, 2, 3, -1, -2, -3)])
             differences = sides[:3] - sides[3:]
             sixth, fourth = SIXTH @ differences / h, FOURTH @ differences / h
-            noise = ROUNDING * max(float(np.abs(sides).max(initial=0.0)), size) / h
+            moved = 3 * h * float(np.abs(one.x).max(initial=0.0))
+            noise = ROUNDING * max(float(np.abs(sides).max(initial=0.0)), size, moved) / h
             apart = (float(np.abs(sixth - fourth).max(initial=0.0)) - noise) / max(float(np.abs(sixth).max(initial=0.0)), 1e-300)
             if not apart >= left:
                 best, left = sixth, apart

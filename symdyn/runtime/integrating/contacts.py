@@ -26,8 +26,8 @@ from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
-from symdyn.runtime.integrating.slip_begins import SlipBegins
-from symdyn.runtime.integrating.slip_ends import NOISE, SlipEnds
+from symdyn.runtime.integrating.slip_begins import TOLERATED, SlipBegins
+from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.stronge import stronge
 
@@ -118,6 +118,12 @@ def _numbers_of(metadata: ModuleMetadata, values: np.ndarray) -> Numbers:
     speeds, coordinates = 3 * n + n * n, 3 * n + n * n + sizes.u * n
     return Numbers(gap, static, kinetic, restitution, rest[:n], rest[n:2 * n], rest[2 * n:3 * n],
                    rest[3 * n:speeds].reshape(n, n), rest[speeds:coordinates].reshape(-1, n), rest[coordinates:].reshape(-1, n))
+
+
+def turning(at: Numbers, tangents: Sequence[int]) -> float:
+    """The rate, 1/s, at which friction in space turns a slip, and at which changes across it decay; tangents: its rows."""
+    gain = float(np.linalg.norm(at.D[np.ix_(tangents, tangents)], 2)) * float(np.linalg.norm(at.force[tangents]))
+    return gain / max(float(np.linalg.norm(at.slip[tangents])), 1e-300)
 
 
 def _check_coefficients(module: Module, at: Numbers, p: np.ndarray) -> None:
@@ -243,6 +249,7 @@ def run_contacts(module: Module, request: Request, part: Part, method: object = 
 
 
 def _without_columns(part: Request) -> Request:
+    """The request of the motion alone."""
     n = part.n_state
     return replace(part, x0=part.x0[:n], atol=part.atol[:n], columns=(), held=(), followed=())
 
@@ -556,10 +563,10 @@ class _Phases:
         p = self._parameters()
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
-        part, last = replace(part, first_step=first) if stiff else part, t >= self.ends.begins
-        if (request.columns or self.keeps) and self._in_space() and not held and not last:
+        part = replace(part, first_step=first) if stiff else part
+        if (request.columns or self.keeps) and self._in_space() and not held and t < self.ends.begins:
             part = self._towards_sticking(t, part, stiff)
-        outcome = self._last_stretch(part) if last and request.columns else self.part(
+        outcome = self._last_stretch(part) if request.columns and t >= self.ends.begins else self.part(
             part, stiff, all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
         if times is not None:  # they come in order, after them the state where the run ends
@@ -588,17 +595,24 @@ class _Phases:
             return part
         end, x = float(ahead.happened[-1].t), ahead.happened[-1].before
         at, begin, tolerated, slips = self._numbers(end, x), self._numbers(t, part.x0), {}, {}
+        sizes = self.module.metadata.sizes
+        rounded = ROUNDED * float(np.abs(part.x0[sizes.q:sizes.q + sizes.u]).max(initial=0.0))
         for k, (mode, record) in enumerate(zip(self.modes, self.records, strict=True)):
             if mode == SLIDING and record.tangents == 2:
-                tolerated[k] = self._tolerated(end, x, k)
+                tolerated[k] = max(self._tolerated(end, x, k), NOISY * rounded)
                 if np.linalg.norm(at.slip[self.tangents[k]]) <= NOISE * tolerated[k]:
                     slips[k] = float(np.linalg.norm(begin.slip[self.tangents[k]]))
         if not slips:
             return part
         self.ends.found(t, end, slips, tolerated)
+        if self.ends.begins <= t:
+            return replace(part, x0=self._into_last_stretch(t, part.x0))
         self.until = min(self.until, self.ends.begins)
         wanted = None if part.times is None else part.times[part.times < self.until]
-        return replace(part, span=(t, self.until), times=None if wanted is None else np.append(wanted, self.until))
+        n = part.n_state
+        noise = rounded / max(min(slips.values()), 1e-300) * float(np.abs(part.x0[n:]).max(initial=0.0))
+        return replace(part, span=(t, self.until), times=None if wanted is None else np.append(wanted, self.until),
+                       atol=np.append(part.atol[:n], np.maximum(part.atol[n:], noise)))
 
     def _into_last_stretch(self, t: float, x: np.ndarray) -> np.ndarray:
         """The state where the last stretch begins, its columns without slips across those that come to their end."""
@@ -706,10 +720,13 @@ class _Phases:
         if start:  # changes of the start keep contacts that are closed there on their surfaces
             self.made.append(Made(tuple(self.modes), tuple(self.still)))
         since = t - self.latest_time if self.phases else self.request.span[1] - t
-        events = [(self.events[k][what], f"{self.records[k].name}_{what}")
-                  for k, what in self._timed(fired).items()] if located else []
+        timed = self._timed(fired) if located else {}
+        events = [(self.events[k][what], f"{self.records[k].name}_{what}") for k, what in timed.items()]
+        stuck = set(timed.values()) == {"sticks"} and not any(
+            mode == SLIDING and record.tangents for mode, record in zip(self.modes, self.records, strict=True))
+        turned = located and not events and all(what == "turns" for _, what in fired)
         switch = Switch(self.module, t, x[:n].copy(), after[:n].copy(), p, self._parameters(), tuple(events),
-                        partial(self._made_again, tuple(self.made)), since, self.request.inputs)
+                        None if turned else partial(self._made_again, tuple(self.made)), since, self.request.inputs, stuck=stuck)
         if events or start:
             self.latest_time = t
         if self.keeps:
@@ -776,8 +793,11 @@ class _Phases:
             if what == "sticks" and len(self.tangents[k]) == 1:
                 self.still[k] = True
             elif what in ("sticks", "turns"):  # a slip within the tolerances has no direction
-                v = self._numbers(t, x).slip[self.tangents[k]]
-                self.still[k] = bool(np.linalg.norm(v) <= self._tolerated(t, x, k))
+                size, tolerated = self._slip(t, x, k), self._tolerated(t, x, k)
+                self.still[k] = size <= tolerated
+                if not self.still[k] and size <= TOLERATED * tolerated and self.done:  # nor has one that turns near them
+                    begin = self.done[-1]
+                    self.still[k] = self._slip(float(begin.t[0]), begin.x[0], k) <= TOLERATED * tolerated
             elif what in ("opens", "slips"):
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         self.made = [Made(tuple(self.modes), tuple(self.still))]
@@ -837,6 +857,10 @@ class _Phases:
             if self.modes[k] == OPEN and gaps[k] < -MISSED * self.size:
                 raise _Stop(f"contact {self.records[k].name} overlaps by {-gaps[k]:.3g} m where it is no longer ignored; let "
                             "`ignored` stay positive until its gap is open")
+
+    def _slip(self, t: float, x: np.ndarray, k: int) -> float:
+        """How fast a contact slips, m/s."""
+        return float(np.linalg.norm(self._numbers(t, x).slip[self.tangents[k]]))
 
     def _slow(self, at: Numbers, k: int) -> bool:
         """Whether a contact does not slip."""
@@ -1000,20 +1024,20 @@ class _Phases:
                      if mode == SLIDING and self.directions[k].any() and slip[self.tangents[k]] @ self.directions[k] < 0]
             if fired:
                 return x, fired
-            return self._realigned(t, x, held, p, self._parameters(), min(self.begins.since.values(), default=t)), []
+            began = max((since for k, since in self.begins.since.items() if k in held), default=None)
+            return self._realigned(t, x, held, p, self._parameters(), began), []
         if self.begins.since:
             at = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], self._parameters()))
-            turning: dict[int, float] = {}
+            rates: dict[int, float] = {}
             for k in self.begins.since:
-                tangents = self.tangents[k]
-                gain = float(np.linalg.norm(at.D[np.ix_(tangents, tangents)], 2)) * float(np.linalg.norm(at.force[tangents]))
-                turning[k] = gain / max(float(np.linalg.norm(at.slip[tangents])), 1e-300)
-            self.begins.settled(t, turning)
+                rates[k] = turning(at, self.tangents[k])
+            self.begins.settled(t, rates)
         return x, []
 
     def _realigned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray], before: np.ndarray, after: np.ndarray,
-                   zero: float) -> np.ndarray:
-        """The state with slips along directions, and its columns; before, after: parameters, zero: when the slips are zero."""
+                   zero: float | None) -> np.ndarray:
+        """The state with slips along directions, and its columns; before, after: parameters, zero: when slips in space end or
+        began."""
         n, request = self.request.n_state, self.request
         found = self._aligned(t, x, held)
         if not request.columns and not self.keeps:

@@ -15,8 +15,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-# The last stretch begins where the slip is so many times what its tolerances let pass; least and largest part of the phase.
+# The last stretch begins where the slip is so many times what its tolerances let pass; its least part of the phase, and the one
+# from which on it is all of that.
 NOISE, LEAST, MOST = 100.0, 1e-8, 0.1
+# What rounding of speeds makes of the direction of a slip, by their size over the slip; what it makes of slips counts as so many
+# times that beside tolerances.
+ROUNDED, NOISY = 10 * np.finfo(float).eps, 1e4
+# The shortest last stretch by the time at which it ends.
+SHORTEST = 1e3 * np.finfo(float).eps
 
 
 @dataclass
@@ -35,5 +41,6 @@ class SlipEnds:
     def found(self, t: float, end: float, slips: Mapping[int, float], tolerated: Mapping[int, float]) -> None:
         """Note that the slips of contacts, m/s at t, come to their end; tolerated: what the tolerances let pass of each."""
         part = max(NOISE * tolerated[k] / max(slip, 1e-300) for k, slip in slips.items())
-        self.begins, self.ends = end - min(max(part, LEAST), MOST) * (end - t), end
+        part = max(part, SHORTEST * abs(end) / (end - t) if end > t else MOST)
+        self.begins, self.ends = t if part >= MOST else end - max(part, LEAST) * (end - t), end
         self.contacts = tuple(slips)
