@@ -128,7 +128,8 @@ def turning(at: Numbers, tangents: Sequence[int]) -> float:
 
 def _check_coefficients(module: Module, at: Numbers, p: np.ndarray) -> None:
     """Raise ArgumentError for friction, restitution and lengths that cannot be, as `params` may give them."""
-    regular = at.kinetic.min() >= 0 <= at.restitution.min() and at.restitution.max() <= 1 and (at.static >= at.kinetic).all()
+    of_contacts = zip(at.static.tolist(), at.kinetic.tolist(), at.restitution.tolist(), strict=True)
+    regular = all(0 <= kinetic <= static and 0 <= e <= 1 for static, kinetic, e in of_contacts)
     if regular and not any(record.lengths for record in module.metadata.contacts):
         return
     values = dict(zip(module.metadata.parameters, p, strict=False))
@@ -198,7 +199,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     that parameters make impossible."""
     at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
     _check_coefficients(module, at, p)
-    if at.gap.min(initial=0.0) >= -TOUCHING:
+    if min(at.gap.tolist()) >= -TOUCHING:
         return
     passed = ignored(module, t, x, p, inputs)
     counts = [record.kind != CLUTCH and not other for record, other in zip(records, passed, strict=True)]
@@ -1128,7 +1129,8 @@ class _Phases:
         times, states = np.array(self.request.span[:1]), self.request.x0[None, :].copy()
         if self.ts:
             times, states = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in (self.ts, self.xs))
-        phase_of = np.repeat(np.arange(len(self.ts)), [len(one) for one in self.ts])
+        phase_of = np.repeat(np.arange(len(self.ts)), [len(one) for one in self.ts]) if len(self.ts) > 1 else np.zeros(
+            len(times) if self.ts else 0, dtype=int)
         notes: dict[str, Any] = {"phases": tuple(self.phases), "impacts": tuple(self.impacts)}
         happened = sorted(self.happened, key=lambda one: one.t)
         if not self.done:
