@@ -139,18 +139,18 @@ def test_derivatives_of_where_a_table_comes_to_rest_that_slides_and_spins() -> N
         leg = sd.contacts.Point([x, y, -0.05])
         system.add_contact(sd.Contact(f"leg_{k}", top, system.ground, shape=leg, friction=mu))
     module, u = system.compile(), np.array([1.0, 0.3, 0, 0, 0, 2.0])
-    x, forward, spin = "q_free_1", "q_free_1_dot", "omega_z_free"
+    place, forward, spin = "q_free_1", "q_free_1_dot", "omega_z_free"
     asked: dict[str, Any] = {"t": (0, 0.8), "q": [0, 0, 0.05, 1, 0, 0, 0]}
     names = ["mu", f"{forward}(0)", f"{spin}(0)"]
     run = module.simulate(**asked, u=u, rtol=1e-9, sensitivities=names)
     assert [run.contacts[f"leg_{k}"].mode[-1] for k in range(3)] == ["sticking"] * 3
-    found = module.gradient(sd.Loss(end=sp.Symbol(x)), names, **asked, u=u, rtol=1e-9)
+    found = module.gradient(sd.Loss(end=sp.Symbol(place)), names, **asked, u=u, rtol=1e-9)
     for name, entry in zip(names, (None, 0, 5), strict=True):
         ends = []
         for k in (-2, -1, 1, 2):
             moved = u + (0 if entry is None else 1e-4 * k * np.eye(6)[entry])
             params = {"mu": 0.3 + 1e-4 * k} if entry is None else None
-            ends.append(module.simulate(**asked, u=moved, params=params, rtol=1e-11)[x][-1])
+            ends.append(module.simulate(**asked, u=moved, params=params, rtol=1e-11)[place][-1])
         difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / 12e-4
         assert abs(run.sensitivity[name][-1, 0] - difference) < 1e-9
         assert abs(found[name] - difference) < 1e-9
