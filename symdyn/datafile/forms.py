@@ -34,7 +34,8 @@ ARGUMENTS = {
     **dict.fromkeys(("axis", "parent_point", "child_point", "point", "point_a", "point_b", "position", "wind", "anchor",
                      "fairlead", "com", "center", "size", "at", "normal"), "vector"),
     **dict.fromkeys(("parent_rotation", "child_rotation", "rotation", "inertia", "A", "K", "B"), "matrix"),
-    "axes": "matrix", "speeds": "symbols", "speed": "symbol", "x": "symbol", "y": "symbol", "orientation": "orientation",
+    "axes": "matrix", "speeds": "symbols", "speed": "symbol", "x": "symbol", "y": "symbol", "angle": "symbol",
+    "orientation": "orientation",
     "units": "texts", "direction": "whole", "boxes": "boxes", "without": "boxes", "beam": "beam", "compliance": "compliance",
     "bristles": "bristles", "shape": "shape", "bodies": "bodies", "planes": "planes", "lowest": "text",
     "Contact.friction": "friction", "ContactGroup.friction": "friction", "ContactGroup.shape": "spheres",
@@ -123,7 +124,7 @@ GROUPS = [Form("ContactGroup", group.ContactGroup, group.ContactGroup, {**_FRICT
 BODIES = [Form("body", System.add_body, object)]
 # What stands in an entry as a table of its own, by its `type`.
 SHAPES = _forms([shapes.Point, shapes.Sphere, shapes.Disc, shapes.Torus, shapes.Cylinder, shapes.Box, shapes.Plane, shapes.Bore,
-                 shapes.Curve, shapes.Surface], {})
+                 shapes.Curve, shapes.Surface, shapes.Cam], {})
 PLAIN = {"boxes": Form("Box", elements.Box, elements.Box), "compliance": Form("Compliance", Compliance, Compliance),
          "bristles": Form("Bristles", Bristles, Bristles)}
 ORIENTATIONS = (EulerAngles, EulerParameters)

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import symdyn as sd
 from symdyn.errors import ModelError, SimulationWarning
-from symdyn.model.contacts.grid import grid_spline_of
+from symdyn.model.contacts.grid import grid_spline_of, line_spline_of
 from symdyn.pipeline import emit
 from symdyn.runtime.integrating.contacts import numbers
 
@@ -250,7 +250,7 @@ def test_shapes_in_space_move_on_surfaces_as_on_the_shapes_that_these_are() -> N
 
 def test_a_road_keeps_the_energy_of_what_slides_on_it_and_its_module_travels() -> None:
     """Without friction; the road is a spline, whose third derivative jumps at its knots, and the module a copy."""
-    along = np.linspace(-3, 3, 13)
+    along = np.linspace(-3, 3, 16)
     module = wheel((SPHERE, Shapes.Curve(CubicSpline(along, 0.1 * np.cos(2 * along)), X)))
     module = pickle.loads(pickle.dumps(module))
     solution = module.simulate((0, 2), q=[0.2, 0.35, 0], u=[1, 0, 0], rtol=1e-11)
@@ -258,6 +258,33 @@ def test_a_road_keeps_the_energy_of_what_slides_on_it_and_its_module_travels() -
     assert closed[-1] and closed.sum() > 500
     assert np.ptp(solution.energy[closed]) < 1e-8
     assert np.abs(solution.contacts["touch"].gap[closed]).max() < 1e-9
+
+
+def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
+    """A roller and a point on a cam that turns, given by an expression and as a periodic spline, against a circle."""
+    off, size = 0.1, 0.5
+    radius = off * sp.cos(X) + sp.sqrt(size**2 - off**2 * sp.sin(X)**2)
+    turn = np.linspace(0, 2 * np.pi, 201)
+    values = sp.lambdify(X, radius)(turn)
+    values[-1] = values[0]
+    spline = CubicSpline(turn, values, bc_type="periodic")
+    start: dict[str, Any] = {"q": {"x": 0.05, "y": 1.0, "phi": 0.3}, "u": {"phi_dot": 2.0}, "rtol": 1e-9}
+
+    def motion(pair: Any) -> np.ndarray:
+        system = sd.System("cam", gravity=[0, -9.81])
+        roller, cam = (system.add_body(name, mass=1.0, inertia=inertia) for name, inertia in (("roller", 0.016), ("cam", 0.1)))
+        system.add_joint(sd.Planar("free", system.ground, roller, sd.coordinates("x y theta")))
+        system.add_joint(sd.Revolute("turn", system.ground, cam, sd.coordinates("phi")))
+        system.add_contact(sd.Contact("touch", roller, cam, shape=pair, friction=0.3, restitution=0.2))
+        solution = system.compile().simulate((0, 0.6), **start)
+        assert [mode for _, mode in solution.contacts["touch"].switches] == ["open", "sticking"]
+        return np.asarray(solution.x)
+
+    circle = Shapes.Sphere(size, [off, 0])
+    rolls = motion((SPHERE, circle))
+    assert np.abs(motion((SPHERE, Shapes.Cam(radius, X))) - rolls).max() < 1e-8
+    assert np.abs(motion((SPHERE, Shapes.Cam(spline, X))) - rolls).max() < 2e-6  # of the interpolation
+    assert np.abs(motion((Shapes.Point(), Shapes.Cam(radius, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
 
 
 def test_what_is_wider_than_a_hollow_is_reported_where_it_touches_twice() -> None:
@@ -275,6 +302,17 @@ def ramp(order: int) -> sd.External:
 
 
 RAMP = ramp(0)
+
+
+@pytest.mark.parametrize(("cam", "message"), [
+    (Shapes.Cam(1 + sp.cos(X) / 9, 3), r"the angle of a Cam is 3; pass the symbol"),  # type: ignore[arg-type]
+    (Shapes.Cam(X * sd.t, X), r"the radius depends on t; a Cam is fixed to its body: write it by X and parameters"),
+    (Shapes.Cam(CubicSpline([0, 3, 6], [1, 2, 1]), X), r"the spline of a Cam goes from 0 to 6 rad and from 1 to 1 m; pass one")])
+def test_cams_that_cannot_be_are_rejected(cam: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        wheel((SPHERE, cam))
+    with pytest.raises(ModelError, match="a Cam belongs to a planar system; pass a Surface"):
+        ball((SPHERE, cam)).check()
 
 
 @pytest.mark.parametrize(("graph", "message"), [
@@ -313,3 +351,13 @@ def test_a_spline_over_a_grid_is_that_of_scipy() -> None:
     assert again is not None and again.texts == function.texts
     assert function.rows([3.0, 0.5, 0, 0])[0] == pytest.approx(other([[3.0, 0.5]])[0], rel=1e-12)
     assert grid_spline_of("road", CubicSpline([0, 1, 2], [0, 1, 0])) is None
+
+
+def test_a_spline_of_many_pieces_is_that_of_scipy() -> None:
+    stream = np.random.default_rng(2)
+    rough = CubicSpline(np.cumsum(stream.uniform(0.1, 1, 40)), stream.normal(size=40))
+    function, x = line_spline_of("road", rough), stream.uniform(-1, 25, 50)
+    for order in range(4):
+        assert np.abs(function.rows([x, order])[:, 0] - rough(x, order)).max() <= 1e-13 * np.abs(rough(x, order)).max()
+        exact = function.precise(mpmath.mp, [mpmath.mpf(x[0]), order])[0]
+        assert float(exact) == pytest.approx(float(rough(x[0], order)), rel=1e-12)

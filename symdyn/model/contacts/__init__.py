@@ -4,7 +4,7 @@ Users reach these names as sd.contacts: shapes, and the laws of compliant contac
 """
 
 from symdyn.model.contacts.compliance import Bristles, Compliance, hertz
-from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface, Torus
+from symdyn.model.contacts.shapes import Bore, Box, Cam, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface, Torus
 
-__all__ = ["Bore", "Box", "Bristles", "Compliance", "Curve", "Cylinder", "Disc", "Plane", "Point", "Sphere", "Surface", "Torus",
-           "hertz"]
+__all__ = ["Bore", "Box", "Bristles", "Cam", "Compliance", "Curve", "Cylinder", "Disc", "Plane", "Point", "Sphere", "Surface",
+           "Torus", "hertz"]

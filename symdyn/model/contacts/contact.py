@@ -10,7 +10,7 @@ import sympy as sp
 
 from symdyn.model.contacts.coefficients import above, coefficients, range_faults, value_of
 from symdyn.model.contacts.compliance import Compliance, compliance_faults
-from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface, Torus
+from symdyn.model.contacts.shapes import Bore, Box, Cam, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface, Torus
 from symdyn.model.faults import Faults
 from symdyn.real_numbers import length_of
 from symdyn.shown import shown
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson", "stronge")
 ORIGIN_OF_A = Point()
-ON_A, ON_B = (Point, Sphere, Disc, Torus, Cylinder, Box), (Plane, Sphere, Bore, Curve, Surface)
+ON_A, ON_B = (Point, Sphere, Disc, Torus, Cylinder, Box), (Plane, Sphere, Bore, Curve, Surface, Cam)
 
 
 class Contact:
@@ -30,7 +30,7 @@ class Contact:
     name          of the contact; events, parameters and results are named after it
     a             the body that carries the shape; b: the body that it touches, which may be the ground
     shape         of sd.contacts: that on a (Point, Sphere, Disc, Torus, Cylinder, Box), or a pair of it and that on b (Plane,
-                  Sphere, Bore, Curve, Surface); default on b: the plane y = 0 of a planar system, z = 0 in space
+                  Sphere, Bore, Curve, Surface, Cam); default on b: the plane y = 0 of a planar system, z = 0 in space
     friction      coefficient of Coulomb friction, or (static, kinetic); numbers or expressions of parameters
     restitution   normal velocity after an impact by that before it, 0 to 1, likewise
     law           "rigid": no penetration; open, sticking and sliding are modes that change at located events; "compliant": forces
@@ -91,7 +91,7 @@ class Contact:
         found = {}
         for what, shape in (("on a", self.on_a), ("on b", self.on_b)):
             for kind in ("radius", "length", "tube"):
-                if hasattr(shape, kind):
+                if hasattr(shape, kind) and not isinstance(shape, Cam):
                     found[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
             if isinstance(shape, Box):
                 found |= {f"edge {k + 1} of the box": Faults().expression(e, "size") for k, e in enumerate(
@@ -119,7 +119,7 @@ class Contact:
         kind_a, kind_b = type(a).__name__, type(b).__name__
         if planar and isinstance(a, (Disc, Torus, Cylinder)):
             found.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")
-        if planar != isinstance(b, Curve) and isinstance(b, (Curve, Surface)):
+        if isinstance(b, Surface if planar else (Curve, Cam)):
             found.append(f"{self.where}: a {kind_b} belongs to a {'spatial' if planar else 'planar'} system; pass a "
                          f"{'Curve' if planar else 'Surface'}")
         if isinstance(a, Box) and length_of(a.size) not in ((2,) if planar else (3,)):

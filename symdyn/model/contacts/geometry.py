@@ -7,7 +7,7 @@ since the touching points move along their surfaces only (envelope theorem).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -17,8 +17,8 @@ import sympy as sp
 
 from symdyn.errors import UnsupportedExpression
 from symdyn.model.contacts.contact import Contact
-from symdyn.model.contacts.grid import GridSpline, grid_spline_of
-from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface, Torus
+from symdyn.model.contacts.grid import Spline, grid_spline_of, line_spline_of
+from symdyn.model.contacts.shapes import Bore, Box, Cam, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface, Torus
 from symdyn.model.contacts.touching import Implicit, circle_of_points, touching_of
 from symdyn.model.faults import Faults
 from symdyn.model.quantity import Measure, Place, Quantity
@@ -29,6 +29,10 @@ Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
 
 # Square of a distance from the middle of a bore, m^2, below which the normal loses its direction.
 CENTRED = sp.Rational(1, 10**30)
+# Pieces of a spline in one variable that are written out; of more a function looks for the piece.
+WRITTEN_OUT = 12
+# Splines of a cam end as they begin to this part.
+NEARLY = 1e-9
 # What heights are written in: real, and of names that no parameter has.
 REAL = (sp.Symbol("abscissa x", real=True), sp.Symbol("abscissa y", real=True))
 # Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
@@ -78,7 +82,7 @@ class Geometry:
     def __init__(self, contact: Contact, planar: bool, fixed: bool, faults: Faults) -> None:
         self.contact, self.planar, self.fixed, self.faults = contact, planar, fixed, faults
         self.a, self.b = (str(getattr(body, "name", body)) for body in (contact.a, contact.b))
-        self._spline = grid_spline_of(f"{contact.name}_height", getattr(contact.on_b, "height", None))
+        self._spline = _spline_of(f"{contact.name}_height", contact.on_b)
 
     def touches(self) -> list[Touch]:
         """The places of the contact, each with its expressions."""
@@ -146,6 +150,8 @@ class Geometry:
             gap = self._number(other.radius, "radius on b") - distance
             normal = _scaled(arm, -1 / distance)
             tangents = self._tangents(normal)
+        elif isinstance(other, Cam):
+            return self._outside_cam(name, at, radius)
         else:
             return self._above_graph(name, at, None if radius == 0 else Round(radius))
         return Touch(name, at, _scaled(normal, -radius), gap - radius, normal, tangents)
@@ -215,26 +221,30 @@ class Geometry:
 
     def _height(self, graph: Any, symbols: Sequence[sp.Symbol]) -> sp.Expr | None:
         """f of a curve or surface, in these symbols; None, with faults, where there is none."""
-        where, before, kind = self.contact.where, len(self.faults), type(graph).__name__
+        where, kind = self.contact.where, type(graph).__name__
         given = [graph.x] if isinstance(graph, Curve) else [graph.x, graph.y]
         if not all(isinstance(s, sp.Symbol) for s in given) or len(set(given)) < len(given):
             self.faults.append(f"{where}: the abscissa of a {kind} is {', '.join(map(shown, given))}; pass the symbols that its "
                                "height is written in")
             return None
+        if self._spline is not None:
+            return self._spline.at(*symbols)
         if isinstance(graph, Curve) and _is_spline(graph.height):
             return _polynomials(graph.height, symbols[0])
-        if isinstance(graph, Surface) and self._spline is not None:
-            return self._spline.at(*symbols)
-        height = self.faults.expression(graph.height, f"{where}: height").xreplace(dict(zip(given, symbols, strict=True)))
-        moving = sorted(str(s) for s in height.free_symbols if isinstance(s, Moving) or s == time)
+        return self._written(graph.height, dict(zip(given, symbols, strict=True)), "height")
+
+    def _written(self, value: Any, symbols: Mapping[sp.Symbol, sp.Symbol], what: str) -> sp.Expr | None:
+        """An expression of what is fixed to body b, in other symbols; None, with faults, where it moves or jumps."""
+        where, before, kind = self.contact.where, len(self.faults), type(self.contact.on_b).__name__
+        found = self.faults.expression(value, f"{where}: {what}").xreplace(dict(symbols))
+        moving = sorted(str(s) for s in found.free_symbols if isinstance(s, Moving) or s == time)
         if moving:
-            self.faults.append(f"{where}: the height depends on {', '.join(moving)}; a {kind} is fixed to its body: write it by "
-                               "its abscissa and parameters, and let the body move")
-        rough = {part for s in symbols for part in height.diff(s).atoms(sp.Derivative, sp.Subs, sp.DiracDelta)}
-        if rough:
-            self.faults.append(f"{where}: the height {shown(graph.height)} has no slope everywhere; leave out what jumps, such "
-                               "as Mod, floor and sign")
-        return height if len(self.faults) == before else None
+            self.faults.append(f"{where}: the {what} depends on {', '.join(moving)}; a {kind} is fixed to its body: write it by "
+                               f"{', '.join(map(str, symbols))} and parameters, and let the body move")
+        if any(found.diff(s).atoms(sp.Derivative, sp.Subs, sp.DiracDelta) for s in symbols.values()):
+            self.faults.append(f"{where}: the {what} {shown(value)} has no slope everywhere; leave out what jumps, such as Mod, "
+                               "floor and sign")
+        return found if len(self.faults) == before else None
 
     def _touching(self, symbols: Sequence[sp.Symbol], height: sp.Expr, center: Sequence[sp.Expr],
                   shape: Round) -> tuple[tuple[sp.Expr, ...], sp.Expr]:
@@ -249,7 +259,7 @@ class Geometry:
         known = tuple(sp.Symbol(name, real=True) for name in names)
         unknowns = tuple(sp.Symbol(name, real=True) for name in ("s_x", "s_y")[:n])
 
-        def implicit(spline: GridSpline | None) -> Implicit:
+        def implicit(spline: Spline | None) -> Implicit:
             f = height if spline is None else spline.at(*symbols)
             f = f.xreplace(dict(zip((*symbols, *parameters), (*unknowns, *known[len(known) - len(parameters):]), strict=True)))
             normal, _ = _normal(unknowns, f)
@@ -265,14 +275,77 @@ class Geometry:
             others = [value(offset) for offset in _other_points(own, lever, normal, n)]
             return Implicit(unknowns, known, own.radius + own.tube, lever[n] - f, residual, tuple(others))
 
-        what = f"contact {self.contact.name}: the {'surface' if n == 2 else 'curve'}"
+        found = self._found(implicit, given, "surface" if n == 2 else "curve", self._spline)
+        return (tuple(center), height) if found is None else (found[0], height if found[1] is None else found[1].at(*symbols))
+
+    def _found(self, implicit: Callable[[Spline | None], Implicit], given: Sequence[sp.Expr], what: str,
+               spline: Spline | None = None) -> tuple[tuple[sp.Expr, ...], Spline | None] | None:
+        """The unknowns of a touching point as functions of what is given; None, with a fault, where they have no text."""
         try:
-            found, spline = touching_of(f"{self.contact.name}_touching", what, implicit,
-                                        self._spline if n == 2 else None)
+            found, together = touching_of(f"{self.contact.name}_touching", f"contact {self.contact.name}: the {what}", implicit,
+                                          spline)
         except UnsupportedExpression as error:
             self.faults.append(f"{self.contact.where}: {error}")
-            return tuple(center), height
-        return tuple(found.applied(given)), height if spline is None else spline.at(*symbols)
+            return None
+        return tuple(found.applied(given)), together
+
+    def _outside_cam(self, name: str, at: Place, radius: sp.Expr) -> Touch:
+        """A point, or a circle around it, outside a closed curve of body b, in polar coordinates; see Beside."""
+        x, y, _ = self._in_b(_add(self._position(self.a, at), self._position(self.b, (sp.S.Zero,) * 3), -1))
+        phi, (R, slope) = sp.atan2(y, x), self._radius_of_cam(self._spline)
+        if radius != 0:
+            parameters = sorted(R.free_symbols - {REAL[0]}, key=lambda s: s.name)
+            phi, spline = self._touching_cam(parameters, phi, radius)
+            if spline is not None:
+                R, slope = self._radius_of_cam(spline)
+        beside = _beside(R.xreplace({REAL[0]: phi}), slope.xreplace({REAL[0]: phi}), radius)
+        (along, across), c, s = beside.normal, sp.cos(phi), sp.sin(phi)
+        normal = (along * c - across * s, along * s + across * c, sp.S.Zero)
+        gap = (sp.sqrt(x**2 + y**2) - beside.reach) * beside.steep
+        return Touch(name, at, self._turned(self.b, _scaled(normal, -radius)), gap, self._turned(self.b, normal),
+                     (self._turned(self.b, (normal[1], -normal[0], sp.S.Zero)),), None if radius == 0 else radius)
+
+    def _radius_of_cam(self, spline: Spline | None) -> tuple[sp.Expr, sp.Expr]:
+        """R of a cam and its derivative, in REAL[0]; a circle, with faults, where there is none."""
+        cam, where, phi = self.contact.on_b, self.contact.where, REAL[0]
+        if not isinstance(cam.angle, sp.Symbol):
+            self.faults.append(f"{where}: the angle of a Cam is {shown(cam.angle)}; pass the symbol that its radius is written "
+                               "in")
+            return sp.S.One, sp.S.Zero
+        if _is_spline(cam.radius):
+            ends = [float(v) for v in cam.radius.x[[0, -1]]]
+            values = [[float(cam.radius(v, order)) for order in (0, 1)] for v in ends]
+            if abs(ends[1] - ends[0] - 2 * np.pi) > NEARLY or np.abs(np.subtract(*values)).max() > NEARLY * abs(values[0][0]):
+                self.faults.append(f"{where}: the spline of a Cam goes from {ends[0]:g} to {ends[1]:g} rad and from "
+                                   f"{values[0][0]:g} to {values[1][0]:g} m; pass one over a turn that ends as it begins: "
+                                   "CubicSpline(..., bc_type='periodic')")
+            half = sp.Float(ends[0]) + sp.pi
+            within = {phi: half + sp.atan2(sp.sin(phi - half), sp.cos(phi - half))}
+            pieces = _polynomials(cam.radius, phi) if spline is None else spline.at(phi)
+            return pieces.xreplace(within), pieces.diff(phi).xreplace(within)
+        R = self._written(cam.radius, {cam.angle: phi}, "radius")
+        return (sp.S.One, sp.S.Zero) if R is None else (R, R.diff(phi))
+
+    def _touching_cam(self, parameters: Sequence[sp.Symbol], psi: sp.Expr,
+                      radius: sp.Expr) -> tuple[sp.Expr, Spline | None]:
+        """The angle at which a circle touches a cam, by that of its centre, and the spline that stands with it in one text."""
+        named = [sp.Symbol(f"parameter_{k + 1}", real=True) for k in range(len(parameters))]
+        center, r, phi = (sp.Symbol(name, real=True) for name in ("psi", "radius", "phi"))
+        names = dict(zip((REAL[0], *parameters), (phi, *named), strict=True))
+
+        def implicit(spline: Spline | None) -> Implicit:
+            R, slope = (e.xreplace(names) for e in self._radius_of_cam(spline))
+            beside, others = _beside(R, slope, r), []
+            for share in BESIDE:
+                angle = center + sp.Float(share) * r / (r + R.xreplace({phi: center}))
+                there = R.xreplace({phi: angle})
+                square = r**2 - (there * sp.sin(angle - center))**2
+                reach = there * sp.cos(angle - center) + sp.sqrt(sp.Max(0, square))
+                others.append((angle, sp.Piecewise((-reach, square > 0), (0, True))))
+            return Implicit((phi,), (center, r, *named), sp.S.One, -beside.reach, (phi + beside.turned - center,), tuple(others))
+
+        found = self._found(implicit, (psi, radius, *parameters), "cam", self._spline)
+        return (psi, None) if found is None else (found[0][0], found[1])
 
     def _in_b(self, v: Triple) -> Triple:
         """A vector of the n-frame in the axes of body b."""
@@ -349,6 +422,28 @@ def _normal(symbols: Sequence[sp.Symbol], height: sp.Expr) -> tuple[Triple, sp.E
     return (entries[0], entries[1], entries[2]), size
 
 
+@dataclass(frozen=True)
+class Beside:
+    """A circle that touches a closed curve at the angle phi: there the curve is R e_r, its normal n along R e_r - R' e_phi.
+
+    normal   n along e_r and e_phi; its centre is at R e_r + r n, at the distance `reach`, turned from phi by `turned`
+    steep    n along the way to the centre: the distance to first order is the way along it times this
+    """
+
+    normal: tuple[sp.Expr, sp.Expr]
+    reach: sp.Expr
+    turned: sp.Expr
+    steep: sp.Expr
+
+
+def _beside(R: sp.Expr, slope: sp.Expr, r: sp.Expr) -> Beside:
+    size = sp.sqrt(R**2 + slope**2)
+    n = (R / size, -slope / size)
+    center = (R + r * n[0], r * n[1])
+    reach = sp.sqrt(center[0]**2 + center[1]**2)
+    return Beside(n, reach, sp.atan2(center[1], center[0]), (n[0] * center[0] + n[1] * center[1]) / reach)
+
+
 def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[tuple[sp.Expr, ...]]:
     """Points of a shape from its centre, along x (and y) and upwards."""
     if shape.axis is not None:
@@ -360,6 +455,14 @@ def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[t
         return [(sp.Float(k) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius) for k in BESIDE]
     return [(sp.Float(k * c) * shape.radius, sp.Float(k * s) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius)
             for k, count in RINGS for c, s in circle_of_points(count)]
+
+
+def _spline_of(label: str, other: Any) -> Spline | None:
+    """The function of a spline that body b has; None of expressions, and of few pieces, which are written out."""
+    if isinstance(other, Surface):
+        return grid_spline_of(label, other.height)
+    value = other.height if isinstance(other, Curve) else other.radius if isinstance(other, Cam) else None
+    return line_spline_of(label, value) if _is_spline(value) and len(value.x) > WRITTEN_OUT + 1 else None
 
 
 def _is_spline(value: Any) -> bool:

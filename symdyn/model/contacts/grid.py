@@ -1,4 +1,7 @@
-"""Splines over a grid, such as SciPy's RectBivariateSpline, as functions on the tape: de Boor's algorithm, with derivatives.
+"""Splines of SciPy's as functions on the tape, with derivatives: in one variable, and over a grid.
+
+In one variable they are polynomials piece by piece, which are found by bisection. Over a grid they are evaluated by de Boor's
+algorithm.
 
 Between the knots t, degree k, a spline in one variable is the sum of c_i B_i. Its derivative has the coefficients
 k (c_i - c_(i-1))/(t_(i+k) - t_i) and degree k - 1; its value comes from k + 1 coefficients by mixing neighbours k times. Over a
@@ -26,21 +29,67 @@ HIGHEST = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class GridSpline(UserFunction):
-    """Of x, y and the orders of the derivatives by them, which are whole numbers: its value or such a derivative.
+class Spline(UserFunction):
+    """Of its variables and the orders of the derivatives by them, which are whole numbers: its value or such a derivative.
 
-    knots, degrees   along x and y; coefficients: (n_x, n_y)
+    knots, degrees   along each variable
+    coefficients     of a grid (n_x, n_y), of polynomials (n_pieces, degree + 1) from the highest
     """
 
-    knots: tuple[tuple[float, ...], tuple[float, ...]] = field(compare=False)
-    degrees: tuple[int, int] = field(compare=False)
+    knots: tuple[tuple[float, ...], ...] = field(compare=False)
+    degrees: tuple[int, ...] = field(compare=False)
     coefficients: tuple[tuple[float, ...], ...] = field(compare=False)
 
     given = False
 
-    def at(self, x: sp.Expr, y: sp.Expr) -> sp.Expr:
+    def at(self, *variables: sp.Expr) -> sp.Expr:
         """Its value as an expression."""
-        return self.applied([x, y, sp.S.Zero, sp.S.Zero])[0]
+        return self.applied([*variables, *[sp.S.Zero] * len(variables)])[0]
+
+    def in_python(self, variables: Sequence[str], orders: Sequence[str]) -> str:
+        """A call of its text in Python for numbers."""
+        raise NotImplementedError
+
+    def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
+        total: Any = 0
+        for k, degree in enumerate(self.degrees):
+            higher = self._higher(k, values)
+            if not is_zero(changes[k]) and higher[len(self.degrees) + k] <= degree:
+                total = total + recorder.call(self, higher)[0] * changes[k]
+        return [total]
+
+    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+        higher = self._higher(k, arguments)
+        return self.applied(higher)[0] if higher[len(self.degrees) + k] <= self.degrees[k] else sp.S.Zero
+
+    def _higher(self, k: int, values: Sequence[Any]) -> list[Any]:
+        """With one derivative more by a variable."""
+        higher, place = list(values), len(self.degrees) + k
+        higher[place] = int(higher[place]) + 1
+        return [sp.Integer(v) if isinstance(v, int) and isinstance(values[0], sp.Basic) else v for v in higher]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineSpline(Spline):
+    """In one variable."""
+
+    def rows(self, values: Sequence[Any]) -> np.ndarray:
+        x, order = symdyn_stacked(values)
+        found = piece_spline(np.array(self.knots[0]), np.array(self.coefficients), x, int(np.max(order, initial=0)))
+        return np.asarray(found)[..., None]
+
+    def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
+        x, order = values
+        return [piece_spline([context.mpf(v) for v in self.knots[0]],
+                             np.array([[context.mpf(v) for v in row] for row in self.coefficients]), x, int(order))]
+
+    def in_python(self, variables: Sequence[str], orders: Sequence[str]) -> str:
+        return f"piece_spline(breaks_of_{self.label}, coefficients_of_{self.label}, {variables[0]}, {orders[0]})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridSpline(Spline):
+    """Over a grid."""
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
         x, y, *orders = symdyn_stacked(values)
@@ -53,19 +102,19 @@ class GridSpline(UserFunction):
         knots, rows = ([[context.mpf(v) for v in line] for line in lines] for lines in (self.knots, self.coefficients))
         return [grid_spline(knots, self.degrees, rows, (x, y), _orders(orders))]
 
-    def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
-        total: Any = 0
-        for k in (0, 1):
-            higher = list(values)
-            higher[2 + k] = int(higher[2 + k]) + 1
-            if not is_zero(changes[k]) and higher[2 + k] <= self.degrees[k]:
-                total = total + recorder.call(self, higher)[0] * changes[k]
-        return [total]
+    def in_python(self, variables: Sequence[str], orders: Sequence[str]) -> str:
+        return (f"grid_spline(knots_of_{self.label}, {self.degrees!r}, coefficients_of_{self.label}, ({', '.join(variables)}), "
+                f"({', '.join(orders)}))")
 
-    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
-        higher = list(arguments)
-        higher[2 + k] = higher[2 + k] + 1
-        return self.applied(higher)[0] if higher[2 + k] <= self.degrees[k] else sp.S.Zero
+
+def line_spline_of(label: str, spline: Any) -> LineSpline:
+    """The function of polynomials piece by piece, such as SciPy's CubicSpline: breaks x, coefficients c."""
+    degree = len(spline.c) - 1
+    made = LineSpline(
+        name=f"symdyn_call_{label}", label=label, arguments=("x", "order"), results=1, texts=(), derivative=None,
+        cost=10 + 2 * degree, numbers=None, digits=piece_spline, reason=f"the spline {label} is not finite",
+        knots=(tuple(spline.x.tolist()),), degrees=(degree,), coefficients=tuple(tuple(column) for column in spline.c.T.tolist()))
+    return replace(made, texts=(("c", _line_in_c(made)), ("numpy", _line_in_python(made))))
 
 
 def grid_spline_of(label: str, spline: Any) -> GridSpline | None:
@@ -108,7 +157,21 @@ def _orders(orders: Sequence[Any]) -> tuple[int, int]:
     return int(orders[0]), int(orders[1])
 
 
-# These two functions stand in generated modules as they are; t, x and c hold numbers, or x arrays (n,) of them.
+# These functions stand in generated modules as they are; t, x and c hold numbers, or x arrays (n,) of them.
+
+
+def piece_spline(breaks: Any, coefficients: Any, x: Any, order: Any) -> Any:
+    """A derivative of polynomials piece by piece; beyond the ends those of the ends go on."""
+    piece = 0
+    for one in breaks[1:-1]:
+        piece = piece + (x >= one)
+    at, columns, degree, value = x - np.array(breaks)[piece], coefficients[piece], coefficients.shape[1] - 1, 0
+    for k in range(degree - order + 1):
+        factor = 1
+        for power in range(degree - k - order + 1, degree - k + 1):
+            factor = factor * power
+        value = value * at + factor * columns[..., k]
+    return value
 
 
 def line_spline(t: Any, k: Any, m: Any, c: Any, x: Any, order: Any) -> Any:
@@ -141,6 +204,44 @@ def grid_spline(knots: Any, degrees: Any, coefficients: Any, at: Any, orders: An
             row = [coefficients[m - k + i][n - other + j] for j in range(other + 1)]
         lines.append(line_spline(knots[1], other, n, row, at[1], orders[1]))
     return line_spline(knots[0], k, m, lines, at[0], orders[0])
+
+
+def _line_in_python(spline: LineSpline) -> str:
+    name = spline.label
+    lines = [*inspect.getsource(piece_spline).splitlines(), f"def {name}(x, order):",
+             f"    return piece_spline(breaks_of_{name}, coefficients_of_{name}, x, int(np.max(order, initial=0)))",
+             f"breaks_of_{name} = np.array({list(spline.knots[0])!r})",
+             f"coefficients_of_{name} = np.array({[list(row) for row in spline.coefficients]!r})"]
+    return "\n".join(line.rstrip().replace(": Any", "").replace(" -> Any", "") for line in lines)
+
+
+def _line_in_c(spline: LineSpline) -> str:
+    name, degree, n = spline.label, spline.degrees[0], len(spline.coefficients)
+    return "\n".join([
+        *_table(f"{name}_x", spline.knots[0]), *_table(f"{name}_c", [v for row in spline.coefficients for v in row]),
+        f"""
+// A derivative of polynomials piece by piece, from the highest coefficient; beyond the ends those of the ends go on.
+static double {name}_at(double x, int order) {{
+    int low = 0, high = {n};
+    while (high - low > 1) {{
+        const int middle = (low + high)/2;
+        if (x >= {name}_x[middle]) low = middle;
+        else high = middle;
+    }}
+    const double at = x - {name}_x[low];
+    double value = 0;
+    for (int k = 0; k <= {degree} - order; k++) {{
+        double factor = 1;
+        for (int power = {degree} - k - order + 1; power <= {degree} - k; power++) factor *= power;
+        value = value*at + factor*{name}_c[{degree + 1}*low + k];
+    }}
+    return value;
+}}
+
+static int {name}(const double *in, double *out) {{
+    out[0] = {name}_at(in[0], (int)in[1]);
+    return 0;
+}}"""])
 
 
 def _text_in_python(spline: GridSpline) -> str:

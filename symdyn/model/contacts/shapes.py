@@ -1,7 +1,7 @@
 """Shapes of contacts: what touches on body a, and what it touches on body b.
 
 On a: Point, Sphere (in a plane a circle), Disc (its edge), Torus, Cylinder (the edges of its ends), Box (its corners). On b:
-Plane, Sphere, Bore, Curve, Surface. Numbers may be expressions of parameters; points and directions are in body axes.
+Plane, Sphere, Bore, Curve, Surface, Cam. Numbers may be expressions of parameters; points and directions are in body axes.
 """
 
 from __future__ import annotations
@@ -182,5 +182,25 @@ class Surface:
     y: sp.Symbol
 
 
+@dataclass(frozen=True)
+class Cam:
+    """A closed curve r = R(angle) around the origin of body b of a planar system, with body a outside it: a cam.
+
+    radius   R, m, an expression of the angle and parameters of the period 2 pi, or a spline of SciPy's over one turn, such as
+             CubicSpline(angles, radii, bc_type="periodic")
+    angle    the symbol of the angle from x towards y of body b, rad
+
+    The gap of a point is the distance to first order, and zero on the cam; that of a Sphere, a roller, the same at the point
+    where it touches, which is found by Newton's method.
+
+    >>> angle = sp.Symbol("angle")
+    >>> sd.contacts.Cam(0.05 + 0.01 * sp.cos(angle), angle).radius
+    0.01*cos(angle) + 0.05
+    """
+
+    radius: Scalar | PPoly
+    angle: sp.Symbol
+
+
 Shape = Point | Sphere | Disc | Torus | Cylinder | Box
-Counterpart = Plane | Sphere | Bore | Curve | Surface
+Counterpart = Plane | Sphere | Bore | Curve | Surface | Cam

@@ -27,7 +27,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import UnsupportedExpression
-from symdyn.model.contacts.grid import GridSpline
+from symdyn.model.contacts.grid import Spline
 from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.evaluate import functions_of
@@ -174,8 +174,8 @@ def _cramer(A: Sequence[Any], b: Sequence[Any]) -> list[Any]:
     return [(A[3] * b[0] - A[1] * b[1]) / determinant, (A[0] * b[1] - A[2] * b[0]) / determinant]
 
 
-def touching_of(label: str, what: str, implicit: Callable[[GridSpline | None], Implicit],
-                spline: GridSpline | None) -> tuple[Touching, GridSpline | None]:
+def touching_of(label: str, what: str, implicit: Callable[[Spline | None], Implicit],
+                spline: Spline | None) -> tuple[Touching, Spline | None]:
     """The function of a touching point, and the spline that stands with it in one text.
 
     implicit   gives the equations with the spline
@@ -264,11 +264,11 @@ class _Lines(Arithmetic):
 
     def call(self, node: Node, args: list[str]) -> list[str]:
         kernel = node.args[0]
-        if not isinstance(kernel, GridSpline):
+        if not isinstance(kernel, Spline):
             raise UnsupportedExpression(f"the height calls {getattr(kernel, 'signature', kernel.name)}, which a round shape does "
                                         "not go with; pass a Point, or the height as an expression or a spline")
-        orders = [str(int(float(order))) for order in args[2:]]
-        return [self.assigned(self.spline(kernel, [*args[:2], *orders]))]
+        n = len(kernel.degrees)
+        return [self.assigned(self.spline(kernel, args[:n], [str(int(float(order))) for order in args[n:]]))]
 
     def assigned(self, text: str) -> str:
         name = f"w{len(self.lines)}"
@@ -278,7 +278,7 @@ class _Lines(Arithmetic):
     def function(self, op: str, args: list[str]) -> str:
         raise NotImplementedError
 
-    def spline(self, spline: GridSpline, args: list[str]) -> str:
+    def spline(self, spline: Spline, variables: list[str], orders: list[str]) -> str:
         raise NotImplementedError
 
 
@@ -294,8 +294,8 @@ class _C(_Lines):
     def function(self, op: str, args: list[str]) -> str:
         return self.written[op].format(*args) if op in self.written else f"{self.named.get(op, op)}({', '.join(args)})"
 
-    def spline(self, spline: GridSpline, args: list[str]) -> str:
-        return f"{spline.label}_at({', '.join(args)})"
+    def spline(self, spline: Spline, variables: list[str], orders: list[str]) -> str:
+        return f"{spline.label}_at({', '.join([*variables, *orders])})"
 
 
 class _Python(_Lines):
@@ -307,10 +307,8 @@ class _Python(_Lines):
     def function(self, op: str, args: list[str]) -> str:
         return self.written[op].format(*args) if op in self.written else f"np.{OPERATIONS[op].numpy}({', '.join(args)})"
 
-    def spline(self, spline: GridSpline, args: list[str]) -> str:
-        x, y, *orders = args
-        return (f"grid_spline(knots_of_{spline.label}, {spline.degrees!r}, coefficients_of_{spline.label}, ({x}, {y}), "
-                f"({', '.join(orders)}))")
+    def spline(self, spline: Spline, variables: list[str], orders: list[str]) -> str:
+        return spline.in_python(variables, orders)
 
 
 def _names(i: Implicit) -> list[str]:
