@@ -312,7 +312,7 @@ class Geometry:
             self.faults.append(f"{where}: the angle of a Cam is {shown(cam.angle)}; pass the symbol that its radius is written "
                                "in")
             return sp.S.One, sp.S.Zero
-        if _is_spline(cam.radius):
+        if spline is not None:
             ends = [float(v) for v in cam.radius.x[[0, -1]]]
             values = [[float(cam.radius(v, order)) for order in (0, 1)] for v in ends]
             if abs(ends[1] - ends[0] - 2 * np.pi) > NEARLY or np.abs(np.subtract(*values)).max() > NEARLY * abs(values[0][0]):
@@ -321,8 +321,7 @@ class Geometry:
                                    "CubicSpline(..., bc_type='periodic')")
             half = sp.Float(ends[0]) + sp.pi
             within = {phi: half + sp.atan2(sp.sin(phi - half), sp.cos(phi - half))}
-            pieces = _polynomials(cam.radius, phi) if spline is None else spline.at(phi)
-            return pieces.xreplace(within), pieces.diff(phi).xreplace(within)
+            return spline.at(phi).xreplace(within), spline.at(phi).diff(phi).xreplace(within)
         R = self._written(cam.radius, {cam.angle: phi}, "radius")
         return (sp.S.One, sp.S.Zero) if R is None else (R, R.diff(phi))
 
@@ -458,11 +457,12 @@ def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[t
 
 
 def _spline_of(label: str, other: Any) -> Spline | None:
-    """The function of a spline that body b has; None of expressions, and of few pieces, which are written out."""
+    """The function of a spline that body b has; None of expressions, and of curves of few pieces, which are written out."""
     if isinstance(other, Surface):
         return grid_spline_of(label, other.height)
     value = other.height if isinstance(other, Curve) else other.radius if isinstance(other, Cam) else None
-    return line_spline_of(label, value) if _is_spline(value) and len(value.x) > WRITTEN_OUT + 1 else None
+    long = _is_spline(value) and (isinstance(other, Cam) or len(value.x) > WRITTEN_OUT + 1)
+    return line_spline_of(label, value) if long else None
 
 
 def _is_spline(value: Any) -> bool:
