@@ -295,7 +295,7 @@ class Geometry:
         phi, (R, slope) = sp.atan2(y, x), self._radius_of_cam(self._spline)
         if radius != 0:
             parameters = sorted(R.free_symbols - {REAL[0]}, key=lambda s: s.name)
-            phi, spline = self._touching_cam(parameters, phi, radius)
+            phi, spline = self._touching_cam(parameters, phi, sp.sqrt(x**2 + y**2), radius)
             if spline is not None:
                 R, slope = self._radius_of_cam(spline)
         beside = _beside(R.xreplace({REAL[0]: phi}), slope.xreplace({REAL[0]: phi}), radius)
@@ -325,25 +325,27 @@ class Geometry:
         R = self._written(cam.radius, {cam.angle: phi}, "radius")
         return (sp.S.One, sp.S.Zero) if R is None else (R, R.diff(phi))
 
-    def _touching_cam(self, parameters: Sequence[sp.Symbol], psi: sp.Expr,
+    def _touching_cam(self, parameters: Sequence[sp.Symbol], psi: sp.Expr, far: sp.Expr,
                       radius: sp.Expr) -> tuple[sp.Expr, Spline | None]:
-        """The angle at which a circle touches a cam, by that of its centre, and the spline that stands with it in one text."""
+        """The angle at which a circle touches a cam, by that of its centre, which is so far away; and the spline that stands with
+        it in one text."""
         named = [sp.Symbol(f"parameter_{k + 1}", real=True) for k in range(len(parameters))]
-        center, r, phi = (sp.Symbol(name, real=True) for name in ("psi", "radius", "phi"))
+        center, away, r, phi = (sp.Symbol(name, real=True) for name in ("psi", "distance", "radius", "phi"))
         names = dict(zip((REAL[0], *parameters), (phi, *named), strict=True))
 
         def implicit(spline: Spline | None) -> Implicit:
             R, slope = (e.xreplace(names) for e in self._radius_of_cam(spline))
             beside, others = _beside(R, slope, r), []
             for share in BESIDE:
-                angle = center + sp.Float(share) * r / (r + R.xreplace({phi: center}))
+                angle = center + sp.Float(share) * r / away
                 there = R.xreplace({phi: angle})
                 square = r**2 - (there * sp.sin(angle - center))**2
                 reach = there * sp.cos(angle - center) + sp.sqrt(sp.Max(0, square))
                 others.append((angle, sp.Piecewise((-reach, square > 0), (0, True))))
-            return Implicit((phi,), (center, r, *named), sp.S.One, -beside.reach, (phi + beside.turned - center,), tuple(others))
+            known, residual = (center, away, r, *named), (phi + beside.turned - center,)
+            return Implicit((phi,), known, sp.S.One, -beside.reach, residual, tuple(others))
 
-        found = self._found(implicit, (psi, radius, *parameters), "cam", self._spline)
+        found = self._found(implicit, (psi, far, radius, *parameters), "cam", self._spline)
         return (psi, None) if found is None else (found[0][0], found[1])
 
     def _in_b(self, v: Triple) -> Triple:
