@@ -290,7 +290,7 @@ class Geometry:
         return tuple(found.applied(given)), together
 
     def _outside_cam(self, name: str, at: Place, radius: sp.Expr) -> Touch:
-        """A point, or a circle around it, outside a closed curve of body b, in polar coordinates; see Beside."""
+        """A point, or a circle around it, outside a closed curve of body b, in polar coordinates; see Tangent."""
         x, y, _ = self._in_b(_add(self._position(self.a, at), self._position(self.b, (sp.S.Zero,) * 3), -1))
         phi, (R, slope) = sp.atan2(y, x), self._radius_of_cam(self._spline)
         if radius != 0:
@@ -298,10 +298,10 @@ class Geometry:
             phi, spline = self._touching_cam(parameters, phi, sp.sqrt(x**2 + y**2), radius)
             if spline is not None:
                 R, slope = self._radius_of_cam(spline)
-        beside = _beside(R.xreplace({REAL[0]: phi}), slope.xreplace({REAL[0]: phi}), radius)
-        (along, across), c, s = beside.normal, sp.cos(phi), sp.sin(phi)
+        tangent = _tangent(R.xreplace({REAL[0]: phi}), slope.xreplace({REAL[0]: phi}), radius)
+        (along, across), c, s = tangent.normal, sp.cos(phi), sp.sin(phi)
         normal = (along * c - across * s, along * s + across * c, sp.S.Zero)
-        gap = (sp.sqrt(x**2 + y**2) - beside.reach) * beside.steep
+        gap = (sp.sqrt(x**2 + y**2) - tangent.reach) * tangent.steep
         return Touch(name, at, self._turned(self.b, _scaled(normal, -radius)), gap, self._turned(self.b, normal),
                      (self._turned(self.b, (normal[1], -normal[0], sp.S.Zero)),), None if radius == 0 else radius)
 
@@ -315,7 +315,8 @@ class Geometry:
         if spline is not None:
             ends = [float(v) for v in cam.radius.x[[0, -1]]]
             values = [[float(cam.radius(v, order)) for order in (0, 1)] for v in ends]
-            if abs(ends[1] - ends[0] - 2 * np.pi) > NEARLY or np.abs(np.subtract(*values)).max() > NEARLY * abs(values[0][0]):
+            apart = np.abs(np.subtract(values[0], values[1])).max()
+            if abs(ends[1] - ends[0] - 2 * np.pi) > NEARLY or apart > NEARLY * abs(values[0][0]):
                 self.faults.append(f"{where}: the spline of a Cam goes from {ends[0]:g} to {ends[1]:g} rad and from "
                                    f"{values[0][0]:g} to {values[1][0]:g} m; pass one over a turn that ends as it begins: "
                                    "CubicSpline(..., bc_type='periodic')")
@@ -335,15 +336,15 @@ class Geometry:
 
         def implicit(spline: Spline | None) -> Implicit:
             R, slope = (e.xreplace(names) for e in self._radius_of_cam(spline))
-            beside, others = _beside(R, slope, r), []
+            tangent, others = _tangent(R, slope, r), []
             for share in BESIDE:
                 angle = center + sp.Float(share) * r / away
                 there = R.xreplace({phi: angle})
                 square = r**2 - (there * sp.sin(angle - center))**2
                 reach = there * sp.cos(angle - center) + sp.sqrt(sp.Max(0, square))
                 others.append((angle, sp.Piecewise((-reach, square > 0), (0, True))))
-            known, residual = (center, away, r, *named), (phi + beside.turned - center,)
-            return Implicit((phi,), known, sp.S.One, -beside.reach, residual, tuple(others))
+            known, residual = (center, away, r, *named), (phi + tangent.turned - center,)
+            return Implicit((phi,), known, sp.S.One, -tangent.reach, residual, tuple(others))
 
         found = self._found(implicit, (psi, far, radius, *parameters), "cam", self._spline)
         return (psi, None) if found is None else (found[0][0], found[1])
@@ -424,7 +425,7 @@ def _normal(symbols: Sequence[sp.Symbol], height: sp.Expr) -> tuple[Triple, sp.E
 
 
 @dataclass(frozen=True)
-class Beside:
+class Tangent:
     """A circle that touches a closed curve at the angle phi: there the curve is R e_r, its normal n along R e_r - R' e_phi.
 
     normal   n along e_r and e_phi; its centre is at R e_r + r n, at the distance `reach`, turned from phi by `turned`
@@ -437,12 +438,12 @@ class Beside:
     steep: sp.Expr
 
 
-def _beside(R: sp.Expr, slope: sp.Expr, r: sp.Expr) -> Beside:
+def _tangent(R: sp.Expr, slope: sp.Expr, r: sp.Expr) -> Tangent:
     size = sp.sqrt(R**2 + slope**2)
     n = (R / size, -slope / size)
     center = (R + r * n[0], r * n[1])
     reach = sp.sqrt(center[0]**2 + center[1]**2)
-    return Beside(n, reach, sp.atan2(center[1], center[0]), (n[0] * center[0] + n[1] * center[1]) / reach)
+    return Tangent(n, reach, sp.atan2(center[1], center[0]), (n[0] * center[0] + n[1] * center[1]) / reach)
 
 
 def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[tuple[sp.Expr, ...]]:
@@ -462,7 +463,7 @@ def _spline_of(label: str, other: Any) -> Spline | None:
     """The function of a spline that body b has; None of expressions, and of curves of few pieces, which are written out."""
     if isinstance(other, Surface):
         return grid_spline_of(label, other.height)
-    value = other.height if isinstance(other, Curve) else other.radius if isinstance(other, Cam) else None
+    value: Any = other.height if isinstance(other, Curve) else other.radius if isinstance(other, Cam) else None
     long = _is_spline(value) and (isinstance(other, Cam) or len(value.x) > WRITTEN_OUT + 1)
     return line_spline_of(label, value) if long else None
 
