@@ -306,6 +306,7 @@ RAMP = ramp(0)
 
 @pytest.mark.parametrize(("cam", "message"), [
     (Shapes.Cam(1 + sp.cos(X) / 9, 3), r"the angle of a Cam is 3; pass the symbol"),  # type: ignore[arg-type]
+    (Shapes.Cam(1 + X / 9, X), r"the radius X/9 \+ 1 of a Cam has not the period 2 pi; write it by sines and cosines"),
     (Shapes.Cam(X * sd.t, X), r"the radius depends on t; a Cam is fixed to its body: write it by X and parameters"),
     (Shapes.Cam(CubicSpline([0, 3, 6], [1, 2, 1]), X), r"the spline of a Cam goes from 0 to 6 rad and from 1 to 1 m; pass one")])
 def test_cams_that_cannot_be_are_rejected(cam: Any, message: str) -> None:

@@ -7,6 +7,7 @@ since the touching points move along their surfaces only (envelope theorem).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -324,6 +325,9 @@ class Geometry:
             within = {phi: half + sp.atan2(sp.sin(phi - half), sp.cos(phi - half))}
             return spline.at(phi).xreplace(within), spline.at(phi).diff(phi).xreplace(within)
         R = self._written(cam.radius, {cam.angle: phi}, "radius")
+        if R is not None and not _is_periodic(R, phi):
+            self.faults.append(f"{where}: the radius {shown(cam.radius)} of a Cam has not the period 2 pi; write it by sines and "
+                               "cosines, or pass a spline over a turn, CubicSpline(..., bc_type='periodic')")
         return (sp.S.One, sp.S.Zero) if R is None else (R, R.diff(phi))
 
     def _touching_cam(self, parameters: Sequence[sp.Symbol], psi: sp.Expr, far: sp.Expr,
@@ -457,6 +461,17 @@ def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[t
         return [(sp.Float(k) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius) for k in BESIDE]
     return [(sp.Float(k * c) * shape.radius, sp.Float(k * s) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius)
             for k, count in RINGS for c, s in circle_of_points(count)]
+
+
+def _is_periodic(R: sp.Expr, phi: sp.Symbol) -> bool:
+    """Whether an expression has the same values a turn later, at some angles and with some numbers for its parameters."""
+    others = sorted(R.free_symbols - {phi}, key=lambda s: s.name)
+    at = {s: sp.Float(0.7 + 0.1 * k) for k, s in enumerate(others)}
+    for angle in (-3.0, -1.2, 0.4, 1.9, 3.1):
+        now, later = (R.xreplace({**at, phi: sp.Float(angle + turn)}).evalf() for turn in (0.0, 2 * math.pi))
+        if now.is_Float and later.is_Float and abs(now - later) > NEARLY * abs(now):
+            return False
+    return True
 
 
 def _spline_of(label: str, other: Any) -> Spline | None:
