@@ -72,7 +72,7 @@ factors = np.sort(np.abs(gait.multipliers))[::-1]
 print(f"period {gait.period:.7f}, stable: {gait.stable}, multipliers {factors[:3].round(5)}")
 
 # %% [markdown]
-# As the feet get lighter, the period goes to the published 3.0961058680777, and the multipliers of this, the longer of the
+# As the feet get lighter, the period goes to the published 3.0961058680777, and the multipliers of this, the shorter of the
 # two gaits on this slope, to 4.00386 and 0.45959: the gait is not stable.
 
 # %%
