@@ -52,10 +52,10 @@ def motion(name: str, t: Any = (0.0, 1.0), **options: Any) -> Solution:
 
 
 def guessed(solution: Solution) -> Drawing:
-    """The picture where a module does not list its joints: its lines come from the motion."""
+    """The picture where a module lists no joints and has no shapes: its lines come from the motion."""
     metadata = solution.module.metadata
     listed = ("joint_points", "joint_axes")
-    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f not in listed))
+    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f not in listed), drawn=())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solution.module, "metadata", fewer)
         found = Drawing.of(solution)
