@@ -100,6 +100,10 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.contacts:run", "contact by work against error: switches located and time stepping, MuJoCo, Exudyn", (
             _names("--only", "names", "some of the motions ball, oscillator, billiard, and of the costs walker, open"),
             _number("--repeats", "repeats", "timed runs, of which the least time counts (default: 3)"), _folder("contacts"))),
+    "balls": Measurement(
+        "symdyn.lab.many_contacts:run", "balls in a box by time stepping: times, and by how much the laws of contact are missed", (
+            Option("numbers", "--numbers", {"metavar": "N,N", "help": "numbers of balls (default: 30,60,125,250,500)"}),
+            _number("--step", "step", "length of the steps, s (default: 0.005)", float, "SECONDS"))),
     "growth": Measurement(
         "symdyn.lab.growth:run", "how everything grows with the number of bodies: table and picture", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,

@@ -408,17 +408,15 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     failed = symdyn_gaps(s, t, x);
     if (!failed) failed = symdyn_add(s, c, &added);  // what touches already
     if (failed) return failed;
-    for (int pass = 0, more = 1; more; pass++) {
+    for (int pass = 0; pass < s->most_passes; pass++) {
+        int more = 0;
         failed = symdyn_gaps(s, t + 0.5 * h, guess);
         if (!failed) failed = symdyn_add(s, c, &more);
-        added |= more;
-        if (!failed && added && pass < s->most_passes) {
-            failed = symdyn_begin(s, t, x);
-            if (!failed) failed = symdyn_rounds(s, c, t, h, x, end);
-            added = 0;
-        } else {
-            more = 0;
-        }
+        if (failed) return failed;
+        if (!more && !added) break;
+        added = 0;
+        failed = symdyn_begin(s, t, x);
+        if (!failed) failed = symdyn_rounds(s, c, t, h, x, end);
         if (failed) return failed;
         for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
     }
