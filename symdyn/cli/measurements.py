@@ -101,7 +101,7 @@ MEASUREMENTS: dict[str, Measurement] = {
             _names("--only", "names", "some of the motions ball, oscillator, billiard, and of the costs walker, open"),
             _number("--repeats", "repeats", "timed runs, of which the least time counts (default: 3)"), _folder("contacts"))),
     "balls": Measurement(
-        "symdyn.lab.many_contacts:run", "balls in a box by time stepping: times, and by how much the laws of contact are missed", (
+        "symdyn.lab.many_contacts:run", "balls in a box by time stepping: times, and how far the laws of contact are missed", (
             Option("numbers", "--numbers", {"metavar": "N,N", "help": "numbers of balls (default: 30,60,125,250,500)"}),
             _number("--step", "step", "length of the steps, s (default: 0.005)", float, "SECONDS"))),
     "growth": Measurement(

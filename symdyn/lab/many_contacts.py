@@ -128,7 +128,8 @@ def run(numbers: str = "30,60,125,250,500", step: float = STEP) -> int:
     """Measure boxes of so many balls each, and print a line of each. Raises ArgumentError for numbers of balls that are none."""
     wanted = [text.strip() for text in numbers.split(",")]
     if not all(text.isdecimal() and int(text) > 0 for text in wanted) or not step > 0:
-        raise ArgumentError(f"balls are {numbers!r}, and the step is {step:g} s; pass numbers such as '30,60', and a positive step")
+        raise ArgumentError(f"balls are {numbers!r}, and the step is {step:g} s; pass numbers such as '30,60', and a positive "
+                            "step")
     print(HEADING, flush=True)
     for text in wanted:
         print(measure(int(text), step), flush=True)
