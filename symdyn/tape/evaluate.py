@@ -85,8 +85,28 @@ class Digits(Arithmetic):
         return self.context.mpf(value)
 
 
-class _AtLeaves(Digits):
-    """With numbers for the leaves, by name, and others in place of constants; what is not defined is NaN."""
+class Lenient(Digits):
+    """With NaN for what is not defined, and functions of the user with many digits."""
+
+    @classmethod
+    def of(cls, context: Any) -> Lenient:
+        """With the digits of a context of mpmath."""
+        made = cls.__new__(cls)
+        made.context, made.functions = context, functions_of(context)
+        return made
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        try:
+            return self.functions[node.op](*args)
+        except ZeroDivisionError:  # harmless in a branch that is not taken
+            return self.context.nan
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return node.args[0].precise(self.context, args)
+
+
+class _AtLeaves(Lenient):
+    """With numbers for the leaves, by name, and others in place of constants."""
 
     def __init__(self, digits: int, values: Mapping[str, Any], constants: Callable[[Fraction], Fraction] | None) -> None:
         super().__init__(digits)
@@ -97,15 +117,6 @@ class _AtLeaves(Digits):
 
     def number(self, value: Any) -> Any:
         return super().number(self.constants(value) if self.constants is not None and isinstance(value, Fraction) else value)
-
-    def step(self, node: Node, args: list[Any]) -> Any:
-        try:
-            return self.functions[node.op](*args)
-        except ZeroDivisionError:  # harmless in a branch that is not taken
-            return self.context.nan
-
-    def call(self, node: Node, args: list[Any]) -> Any:
-        return node.args[0].precise(self.context, args)
 
 
 @functools.cache

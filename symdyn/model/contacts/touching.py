@@ -30,7 +30,7 @@ from symdyn.errors import UnsupportedExpression
 from symdyn.model.contacts.grid import Spline
 from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.differentiate import forward, jacobian
-from symdyn.tape.evaluate import functions_of
+from symdyn.tape.evaluate import Lenient
 from symdyn.tape.external import UserFunction
 from symdyn.tape.floats import FUNCTIONS
 from symdyn.tape.node import STATE, Node
@@ -109,7 +109,7 @@ class Touching(UserFunction):
         return np.moveaxis(np.array(found), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        found = self._solved(_Digits(context), values, context.sqrt(context.eps))
+        found = self._solved(Lenient.of(context), values, context.sqrt(context.eps))
         return [context.nan] * self.results if found is None else list(found)
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
@@ -146,24 +146,6 @@ class _Doubles(Arithmetic):
 
     def call(self, node: Node, args: list[Any]) -> Any:
         return node.args[0].rows(args)
-
-
-class _Digits(Arithmetic):
-    def __init__(self, context: Any) -> None:
-        self.context, self.functions = context, functions_of(context)
-
-    def number(self, value: Any) -> Any:
-        return value if isinstance(value, bool) else self.context.mpf(getattr(value, "numerator", value)) / getattr(
-            value, "denominator", 1)
-
-    def step(self, node: Node, args: list[Any]) -> Any:
-        try:
-            return self.functions[node.op](*args)
-        except ZeroDivisionError:  # harmless in a branch that is not taken
-            return self.context.nan
-
-    def call(self, node: Node, args: list[Any]) -> Any:
-        return node.args[0].precise(self.context, args)
 
 
 def _cramer(A: Sequence[Any], b: Sequence[Any]) -> list[Any]:
