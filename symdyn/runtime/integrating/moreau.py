@@ -48,7 +48,7 @@ MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES = 20_000, 60, 30
 # Change of the last round of a step, by the size of the state, above which the step is too long.
 ACCEPTED = 1e-6
 # The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
-FEW = 40
+FEW = 12
 GROUP_DENSE = 240
 GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 5e-7, 1e-7, 1.0
 GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 200, 2, 2
