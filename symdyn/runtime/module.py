@@ -811,8 +811,7 @@ class Module:
                     `BatchSolution.sensitivity`
 
         device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
-                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are those of the processor to 1e-12 where motions do
-                    not magnify rounding
+                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, projections onto constraints included, and a lane that is through goes on with the next motion.
@@ -1178,7 +1177,7 @@ class Module:
         return (RightSide() if what == "rhs" else what) in self._units
 
     def remembered(self, name: str, make: Callable[[], Any]) -> Any:
-        """What was made for this thread under a name, made now if it was not."""
+        """An object that this thread made under a name; it is made now if it was not."""
         kept = self._local.__dict__
         if name not in kept:
             kept[name] = make()
