@@ -11,6 +11,8 @@ from symdyn.pictures.style import SCREEN, Style, colors_of
 from symdyn.pictures.symbols import axis_label, typeset
 
 _ENERGY = ("#D55E00", "#0072B2", "#000000")
+# Columns of a legend above its axes at most, and what numbers and names on the left take of the width, inches.
+_MOST_COLUMNS, _LABELS = 4, 0.6
 
 
 def draw_panel(axes: Any, t: np.ndarray, panel: Panel, style: Style = SCREEN) -> None:
@@ -32,8 +34,20 @@ def draw_panel(axes: Any, t: np.ndarray, panel: Panel, style: Style = SCREEN) ->
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=style.legend, frameon=False, handlelength=1.2,
                     labelspacing=0.3)
     elif count > 1:
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=style.legend, frameon=False, handlelength=1.6,
-                    columnspacing=1.0, borderaxespad=0.1)
+        _legend_above(axes, count, style)
+
+
+def _legend_above(axes: Any, count: int, style: Style) -> None:
+    """A legend in as many columns as the axes are wide; above the power of ten of large numbers, where there is one."""
+    ticks = axes.yaxis.get_major_formatter()
+    ticks.set_locs(axes.get_yticks())
+    above = 1.6 if ticks.get_offset() else 0.1
+    renderer = axes.figure.canvas.get_renderer()
+    for columns in range(min(_MOST_COLUMNS, count), 0, -1):
+        legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=style.legend, frameon=False,
+                             handlelength=1.6, columnspacing=1.0, borderaxespad=above)
+        if legend.get_window_extent(renderer).width / axes.figure.dpi <= style.wide - _LABELS:
+            break
 
 
 def _show_small(axes: Any, values: np.ndarray) -> None:

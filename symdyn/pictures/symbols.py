@@ -9,6 +9,10 @@ _GREEK = frozenset("alpha beta gamma delta epsilon zeta eta theta iota kappa lam
                    "Gamma Delta Theta Lambda Xi Sigma Phi Psi Omega".split())
 # A letter, Greek or Latin, with an index or without.
 _SYMBOL = re.compile(r"([A-Za-z]+?)(?:_?(\d+)|_([A-Za-z0-9_]+)|)")
+# Digits above the line.
+_RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
+                        "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}"
+                        "\N{SUPERSCRIPT SEVEN}\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}")
 _ACCENTS = {"_dot": r"\dot", "_ddot": r"\ddot"}
 
 
@@ -37,4 +41,13 @@ def axis_label(names: Sequence[str], title: str, unit: str) -> str:
     signs = [typeset(name) for name in names]
     few = len(names) == 1 or (len(names) <= 3 and all(sign.startswith("$") for sign in signs))
     label = ", ".join(signs) if few else title
-    return f"{label} [{unit}]" if unit else label
+    return f"{label} [{typeset_unit(unit)}]" if unit else label
+
+
+def typeset_unit(unit: str) -> str:
+    """A unit with raised powers, as letters that every font has.
+
+    >>> typeset_unit("kg m^2"), typeset_unit("s^-1")
+    ('kg m²', 's⁻¹')
+    """
+    return re.sub(r"\^-?\d+", lambda power: power[0][1:].translate(_RAISED), unit)

@@ -19,6 +19,7 @@ from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of
 from symdyn.pictures.mechanism import touched
+from symdyn.pictures.symbols import typeset_unit
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
@@ -176,4 +177,5 @@ def _sliders(equations: Equations, values: dict[str, float], names: Sequence[str
 
 def _slider(group: str, k: int, name: str, unit: str, value: float, least: float, most: float,
             moves: bool = True) -> dict[str, Any]:
-    return {"group": group, "k": k, "name": name, "unit": unit, "value": value, "least": least, "most": most, "moves": moves}
+    return {"group": group, "k": k, "name": name, "unit": typeset_unit(unit), "value": value, "least": least, "most": most,
+            "moves": moves}

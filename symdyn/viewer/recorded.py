@@ -13,6 +13,7 @@ from symdyn.pictures.bending import bendings
 from symdyn.pictures.mechanism import Hung, mechanism_of
 from symdyn.pictures.panels import panels_of
 from symdyn.pictures.solids import lengths_of
+from symdyn.pictures.symbols import typeset_unit
 from symdyn.shown import shown
 from symdyn.viewer.arrays import packed
 from symdyn.viewer.page import View, page_of
@@ -149,6 +150,6 @@ def _panels(solution: Solution, order: np.ndarray) -> list[dict[str, Any]]:
         values = panel.values[rows]
         if np.isfinite(values).all():
             title = f"{panel.title}: {panel.part}" if panel.part else panel.title
-            found.append({"title": title, "unit": panel.unit, "names": [n.replace("\n", " ") for n in panel.names],
+            found.append({"title": title, "unit": typeset_unit(panel.unit), "names": [n.replace("\n", " ") for n in panel.names],
                           "t": packed(solution.t[rows]), "values": packed(values)})
     return found

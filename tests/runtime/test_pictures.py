@@ -159,6 +159,21 @@ def test_on_paper_curves_are_as_wide_as_a_column_with_their_letters(tmp_path: Pa
         motion("double_pendulum").plot(style="print")
 
 
+def test_on_paper_long_names_leave_the_curves_their_width() -> None:
+    """A legend stands in as many columns as fit, and above the power of ten of large numbers."""
+    figure = motion("floating_wind_turbine").plot(style="paper")
+    figure.canvas.draw()
+    renderer, wide = figure.canvas.get_renderer(), figure.bbox.width
+    assert {"output [m/s²]", "energy [J]"} <= set(labels(figure))
+    for axes in figure.axes:
+        assert axes.get_window_extent().width > 0.7 * wide, axes.get_ylabel()
+        legend, power = axes.get_legend(), axes.yaxis.get_offset_text()
+        if legend is not None:
+            assert legend.get_window_extent(renderer).x1 <= wide, axes.get_ylabel()
+            assert not power.get_text() or not legend.get_window_extent(renderer).overlaps(power.get_window_extent(renderer))
+    assert any(axes.yaxis.get_offset_text().get_text() for axes in figure.axes)
+
+
 def test_events_are_marked_with_their_names() -> None:
     system = systems.pendulum()
     system.add_event("lowest", symdyn.coordinates("q1"))
