@@ -23,10 +23,12 @@ HEAD, WIDTH, BEHIND, FULL = 0.25, 0.11, 0.16, 0.05
 # A torque about what a plane picture is seen along: an arc of so many corners around so much of a circle, whose radius is this
 # share of the arrow's length.
 _CORNERS, _AROUND, _RADIUS = 25, 1.5 * np.pi, 0.5
+# What is this much smaller than the largest force, or torque, is rounding.
+_ROUNDING = 1e-9
 # What the layers are called, and their colours: readers with any kind of colour vision can tell them apart.
 TITLES = {"forces": "forces in joints", "loads": "forces of loads", "torques": "torques of loads", "weights": "weights",
           "contacts": "forces of contacts"}
-COLORS = {"forces": "#B45309", "loads": "#047857", "torques": "#7C3AED", "weights": "#64748B", "contacts": "#D55E00"}
+COLORS = {"forces": "#7C2D12", "loads": "#047857", "torques": "#7C3AED", "weights": "#64748B", "contacts": "#D55E00"}
 
 
 @dataclass(frozen=True)
@@ -84,15 +86,20 @@ def arrows_of(solution: Solution, length: float, forces: bool = False) -> list[A
     """The arrows of a motion: forces of contacts, where there are some.
 
     length   of the mechanism, m
-    forces   with forces in joints and of loads and weights, to one scale, and torques of loads; what is zero all the time is
-             left out
+    forces   with forces in joints and of loads and weights, to one scale, and torques of loads; what is zero all the
+             time, or rounding, is left out
     """
     found = [*_contacts(solution, length)]
     if forces:
-        others = [one.only(np.flatnonzero(np.nan_to_num(one.vectors).any(axis=(0, 2))).tolist())
-                  for kind in (_joints, _loads, _weights) for one in kind(solution)]
+        others = [one for kind in (_joints, _loads, _weights) for one in kind(solution)]
         common = max([one.largest for one in others if not one.turns], default=0.0)
-        found += [replace(one, scale=LARGEST * length / (one.largest if one.turns else common)) for one in others if one.names]
+        strongest = max([common, *[one.largest for one in found]])
+        for one in others:
+            least = _ROUNDING * (max(one.largest, strongest * length) if one.turns else strongest)
+            sizes = np.nan_to_num(np.linalg.norm(one.vectors, axis=2)).max(axis=0, initial=0.0)
+            acting = one.only(np.flatnonzero(sizes > least).tolist())
+            if acting.names:
+                found.append(replace(acting, scale=LARGEST * length / (acting.largest if acting.turns else common)))
     return [replace(one, head=FULL * length) for one in found]
 
 

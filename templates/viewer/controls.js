@@ -30,21 +30,25 @@ function slider(parent, { name, unit, least, most, value, step }, change) {
     input.id = label.htmlFor = `slider-${++numbered}`;
     input.dataset.name = name;
     [input.min, input.max, input.step] = [least, most, step || (most - least) / 1000 || 1e-3];
-    const digits = Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(most - least || 1))));
+    const range = most - least || 1, digits = Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(range))));
+    // A value that is small against the range, such as that of the start, is not shown as zero; what is rounding is.
+    const text = v => String(+(Math.abs(v) > 1e-6 * range && Math.abs(v) < 1e-3 * range ? v.toPrecision(2) : v.toFixed(digits)));
     // quick: without the number, which costs a layout of the page.
     const show = (v, quick = false) => {
         input.value = v;
-        if (!quick) output.textContent = String(+v.toFixed(digits));
+        if (!quick) output.textContent = text(v);
     };
     show(value);
     input.addEventListener("input", () => change(Number(input.value), show));
     return { input, show };
 }
 
-function check(parent, text, on, change) {
+// color: of what the box shows and hides, three numbers; or none.
+function check(parent, text, on, change, color) {
     const label = element(parent, "label", "check"), input = element(label, "input");
     input.type = "checkbox";
     input.checked = on;
+    if (color) element(label, "i").style.setProperty("--color", `rgb(${color.map(c => Math.round(255 * c)).join(" ")})`);
     label.append(text);
     input.addEventListener("change", () => change(input.checked));
     return input;

@@ -67,7 +67,8 @@ function toolbar(parent, stage, live) {
     button(parent, "⟲", "Look at everything", () => stage.reset());
     button(parent, "+", "Nearer", () => stage.zoom(0.85));
     button(parent, "−", "Farther", () => stage.zoom(1 / 0.85));
-    const layer = (name, text) => check(parent, text, stage.layers[name], on => { stage.layers[name] = on; stage.invalidate(); });
+    const layer = (name, text, color) =>
+        check(parent, text, stage.layers[name], on => { stage.layers[name] = on; stage.invalidate(); }, color);
     layer("names", "names");
     layer("frames", "frames");
     layer("centres", "centres of mass");
@@ -76,11 +77,11 @@ function toolbar(parent, stage, live) {
     choice(parent, "follow ", [[-1, "nothing"], ...bodies], k => stage.setFollow(k));
     if (live) return;
     choice(parent, "trail ", [[-2, "none"], [-1, "all"], ...bodies], k => { stage.trail = k; stage.invalidate(); });
-    const kinds = new Map(stage.scenes.flatMap(s => s.source.arrows.map(({ layer, title }) => [layer, title])));
+    const kinds = new Map(stage.scenes.flatMap(s => s.source.arrows.map(({ layer, title, color }) => [layer, { title, color }])));
     if (!kinds.size) return;
-    for (const [name, title] of kinds) {
+    for (const [name, { title, color }] of kinds) {
         stage.layers[name] = true;
-        layer(name, title);
+        layer(name, title, color);
     }
     slider(parent, { name: "length of arrows", least: 0.1, most: 10, value: 1 }, (v, show) => { stage.forceScale = v; show(v); stage.invalidate(); });
 }

@@ -164,7 +164,7 @@ class Stage {
         this.drawTrails(scene);
         if (this.layers.inertia) for (const item of scene.items) if (item.kind === "ellipsoid") this.drawItem(scene, item);
         if (data.water) this.drawWater(scene);
-        for (const arrows of source.arrows || []) if (this.layers[arrows.layer] !== false) this.drawArrows(scene, arrows);
+        for (const arrows of source.arrows || []) if (this.layers[arrows.layer] !== false) this.drawArrows(scene, arrows, dark);
     }
 
     drawWater(scene) {
@@ -192,11 +192,12 @@ class Stage {
         return scene.water;
     }
 
-    rod(scene, a, b, radii, color, name, mesh = "rod") {
+    // flat: as `draw` of the renderer has it.
+    rod(scene, a, b, radii, color, name, mesh = "rod", flat = 0) {
         const way = minus(b, a), long = size(way);
         if (!(long > 1e-9 * this.length)) return;
         const z = times(way, 1 / long), [x, y] = across(z), stretch = [radii[0], radii[0], long];
-        this.renderer.draw(this.library[mesh], placed(x, y, z, a, stretch), stretch, color, mesh === "rod" ? radii[1] / radii[0] : 1);
+        this.renderer.draw(this.library[mesh], placed(x, y, z, a, stretch), stretch, color, mesh === "rod" ? radii[1] / radii[0] : 1, flat);
         if (name) scene.picks.push({ a, b, radius: Math.max(...radii), name });
     }
 
@@ -284,8 +285,9 @@ class Stage {
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
 
-    // What of one kind acts now, to its scale.
-    drawArrows(scene, { layer, names, points, scale, longest, color, unit, now }) {
+    // What of one kind acts now, to its scale; on a dark ground in a lighter colour, as style.css has it for its check box.
+    drawArrows(scene, { layer, names, points, scale, longest, color: given, unit, now }, dark) {
+        const color = dark ? given.map(c => 0.2 + 0.8 * c) : given;
         const { source } = scene, wide = points.length ? 3 : 6;
         // Nothing hides a force.
         this.renderer.over(true);
@@ -299,10 +301,11 @@ class Stage {
         this.renderer.over(false);
     }
 
+    // Without light and shade: colours are what arrows are told apart by.
     arrow(scene, a, way, color, name, heads = 1) {
         const long = size(way), r = 0.007 * this.length, share = Math.min(5 * r / long, 0.5 / heads), b = add(a, way);
-        this.rod(scene, a, add(b, way, -heads * share), [r, r], color, name);
-        for (let k = 0; k < heads; k++) this.rod(scene, add(b, way, -(k + 1) * share), add(b, way, -k * share), [2.4 * r, 0.01 * r], color);
+        this.rod(scene, a, add(b, way, -heads * share), [r, r], color, name, "rod", 2);
+        for (let k = 0; k < heads; k++) this.rod(scene, add(b, way, -(k + 1) * share), add(b, way, -k * share), [2.4 * r, 0.01 * r], color, undefined, "rod", 2);
     }
 
     twoHeads(scene, a, way, color, name) { this.arrow(scene, a, way, color, name, 2); }
@@ -312,8 +315,8 @@ class Stage {
         const sense = Math.sign(way[2]) || 1, radius = 0.5 * size(way), corners = 24;
         const at = k => { const p = sense * TURN * (-1 / 8 + 3 / 4 * k / corners); return add(a, [Math.cos(p), Math.sin(p), 0], radius); };
         const r = 0.007 * this.length, last = Math.max(1, corners - Math.ceil(5 * r / (radius * TURN * 3 / 4 / corners)));
-        for (let k = 1; k <= last; k++) this.rod(scene, at(k - 1), at(k), [r, r], color, name);
-        this.rod(scene, at(last), at(corners), [2.4 * r, 0.01 * r], color);
+        for (let k = 1; k <= last; k++) this.rod(scene, at(k - 1), at(k), [r, r], color, name, "rod", 2);
+        this.rod(scene, at(last), at(corners), [2.4 * r, 0.01 * r], color, undefined, "rod", 2);
     }
 
     drawTrails(scene) {

@@ -18,7 +18,7 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.colors import to_rgb
 
-from symdyn.pictures.arrows import LARGEST
+from symdyn.pictures.arrows import COLORS, LARGEST, arrows_of
 from symdyn.pictures.drawing import Drawing
 
 
@@ -95,7 +95,10 @@ def test_loads_can_be_seen_and_hidden(module: Module, chromium: Any, tmp_path: P
         picks = opened.page.evaluate("symdyn.scenes[0].picks.filter(p => p.name.startsWith('push on cart'))")
         assert picks[0]["name"] == "push on cart: 3.742 N"
         np.testing.assert_allclose(picks[0]["a"], load[k, :3], atol=1e-6)
+        swatch = opened.page.locator("label.check", has_text="forces of loads").locator("i")
+        assert swatch.evaluate("e => getComputedStyle(e).backgroundColor") == "rgb(4, 120, 87)"
         seen = opened.pixels()
+        assert (seen[:, :3] == (4, 120, 87)).all(axis=1).sum() > 50  # light and shade do not change it
         opened.page.get_by_label("forces of loads").uncheck()
         assert (seen != opened.pixels()).any(axis=1).sum() > 300
         assert not opened.page.evaluate("symdyn.scenes[0].picks.some(p => p.name.startsWith('push'))")
@@ -184,3 +187,27 @@ def test_arrows_of_contacts_are_not_shown_twice() -> None:
     system.add_contact(sd.Contact("floor", ball, system.ground, shape=sd.contacts.Sphere(0.2), friction=0.3))
     system.add_force(ball, [1, 0, 0], name="push")
     assert system.embedding().acting == (("push", "ball", "force"),)
+
+
+def test_rounding_in_joints_without_forces_is_no_arrow() -> None:
+    """A joint that leaves a body free transmits nothing but rounding, which has neither an arrow nor a check box."""
+    solution = sd.systems.rocking_block().compile(backend="numpy").simulate((0, 0.5))
+    assert 0 < np.abs(solution.rows("reactions")).max() < 1e-6
+    assert [one.layer for one in arrows_of(solution, 1.0, forces=True)] == ["contacts", "weights"]
+
+
+def test_colours_of_arrows_can_be_told_apart() -> None:
+    """By readers who see all colours, and by those without long or middle cones (Machado, Oliveira and Fernandes, 2009): by 15 of
+    CIELAB, of which 2 can just be seen."""
+    no_long = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])
+    no_middle = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    to_lab = np.array([[0, 116, 0], [500, -500, 0], [0, 200, -200]])
+    for lighter in (0.0, 0.2):  # on a dark ground
+        colors = lighter + (1 - lighter) * np.array([to_rgb(color) for color in COLORS.values()])
+        linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055)**2.4)
+        for eyes in (np.eye(3), no_long, no_middle):
+            xyz = np.clip(linear @ eyes.T, 0, 1) @ to_xyz.T / [0.9505, 1, 1.089]
+            lab = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116) @ to_lab.T
+            apart = np.linalg.norm(lab[:, None] - lab, axis=2)[np.triu_indices(len(lab), 1)]
+            assert apart.min() > 15, (lighter, apart.min())

@@ -140,6 +140,16 @@ def test_loops_stay_closed(every_browser: Any, tmp_path: Path) -> None:
         np.testing.assert_allclose(opened.page.evaluate("symdyn.scenes[0].source.values.q"), q)
 
 
+def test_numbers_of_sliders_are_not_rounded_to_zero(chromium: Any, tmp_path: Path) -> None:
+    """A start that is small against the range of its slider is shown; what is rounding is zero."""
+    sd.systems.floating_wind_turbine().show(tmp_path / "view.html", q={"x": -0.0123, "y": 1e-12})
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        shown = opened.page.eval_on_selector_all("#sliders .slider output", "all => all.map(e => e.textContent)")
+        ranges = [s["most"] - s["least"] for s in opened.page.evaluate("symdyn.scenes[0].data.sliders")[:2]]
+        assert ranges[0] > 12.3, ranges
+        assert shown[:2] == ["-0.012", "0"]
+
+
 def test_euler_parameters_keep_unit_length(chromium: Any, tmp_path: Path) -> None:
     system = sd.System("top", gravity=[0, 0, -9.81])
     body = system.add_body("body", mass=1, inertia=[0.1, 0.2, 0.3])
