@@ -105,25 +105,29 @@ def woodpecker_toy() -> System:
                                    parent_point=[at, 0]))
         joint = system.add_joint(Revolute(f"{angle.name}_hinge", carrier, body, coordinate=angle))
         system.add_joint_force(joint, -c * (angle - other))
-        parts.append(body)
+        parts += [carrier, body]
     play = r_M - r_0
-    edges = {"beak": (reach - l_S - r_0 - h_S * bird, y + l_M * sleeve + (l_G - l_S) * bird, e),
-             "low": (play + h_M * sleeve, y + r_M * sleeve, 0), "up": (play - h_M * sleeve, y + r_M * sleeve, 0)}
-    for name, (gap, way, restitution) in edges.items():
+    edges = {"beak": (reach - l_S - r_0 - h_S * bird, y + l_M * sleeve + (l_G - l_S) * bird, h_S, e),
+             "low": (play + h_M * sleeve, y + r_M * sleeve, -h_M, 0), "up": (play - h_M * sleeve, y + r_M * sleeve, h_M, 0)}
+    for name, (gap, way, height, restitution) in edges.items():
         carrier, edge = system.add_body(f"{name}_carrier"), system.add_body(f"{name}_edge")
-        system.add_joint(Prismatic(f"{name}_gap", system.ground, carrier, axis=[1, 0], coordinate=gap))
-        system.add_joint(Prismatic(f"{name}_way", carrier, edge, axis=[0, 1], coordinate=way))
-        system.add_contact(Contact(name, edge, system.ground, shape=(Point(), Plane([1, 0])), friction=mu,
+        system.add_joint(Prismatic(f"{name}_way", system.ground, carrier, axis=[0, 1], coordinate=way,
+                                   parent_point=[r_0, height]))
+        system.add_joint(Prismatic(f"{name}_gap", carrier, edge, axis=[1, 0], coordinate=gap))
+        system.add_contact(Contact(name, edge, system.ground, shape=(Point(), Plane([1, 0], [r_0, 0])), friction=mu,
                                    restitution=restitution))
     numbers = (3e-4, 4.5e-3, 5e-9, 7e-7, 0.0056, 0.0025, 0.0031, 0.0058, 0.010, 0.015, 0.02, 0.0201, 9.81, 0.3, 0.5)
     system.defaults = dict(zip(symbols, numbers, strict=True))
     system.initial = {sleeve: -(0.0031 - 0.0025) / 0.0058, bird: -0.2788, y.dot: -0.3411, bird.dot: -7.4583}
     system.units = {m_M: "kg", m_S: "kg", J_M: "kg m^2", J_S: "kg m^2", c: "N m/rad", **dict.fromkeys(symbols[5:12], "m"),
                     g: "m/s^2", mu: "1", e: "1"}
-    system.draw(system.ground, shapes.Cylinder([0, -0.12, 0], [0, 0.03, 0], 0.0025, 0.0025), color="0.7")
+    system.draw(system.ground, shapes.Cylinder([0, -0.155, 0], [0, 0.03, 0], 0.0025, 0.0025), color="0.7")
     sides = [[-0.0031, -0.0058, 0], [-0.0031, 0.0058, 0], [0.0031, 0.0058, 0], [0.0031, -0.0058, 0], [-0.0031, -0.0058, 0]]
     outline = [[0, -0.02, 0], [0.004, 0, 0], [0, 0.02, 0], [-0.0201, 0.02, 0], [0, 0.016, 0], [-0.004, 0, 0], [0, -0.02, 0]]
-    system.draw(parts[0], shapes.Line(sides, 2.0), color="#7a4b8a")
-    system.draw(parts[1], shapes.Line(outline, 2.0), color="#4a6a8a")
+    arms = [[0.0031, 0, 0], [0.010, 0, 0]], [[-0.015, 0, 0], [-0.004, 0, 0]]  # which the spring joins
+    for carrier, body, lines, color in ((*parts[:2], (sides, arms[0]), "#7a4b8a"), (*parts[2:], (outline, arms[1]), "#4a6a8a")):
+        system.draw(carrier, shapes.Cylinder([0, 0, -0.001], [0, 0, 0.001], 0.0008, 0.0008), color=color)
+        for points in lines:
+            system.draw(body, shapes.Line(points, 2.0), color=color)
     system.duration = 1.0
     return system

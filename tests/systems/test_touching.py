@@ -54,6 +54,18 @@ def test_the_woodpecker_comes_to_its_period() -> None:
     assert np.abs(np.diff(laps[-4:])).max() < np.abs(np.diff(laps[:4])).max() / 3
 
 
+def test_the_woodpecker_touches_its_pole_where_it_is_drawn() -> None:
+    """The edges of the sleeve at its height on the side of the pole, the beak where the outline of the bird has it."""
+    solution = sd.systems.woodpecker_toy().compile().simulate((0, 0.5))
+    at, forces = np.moveaxis(solution.rows("contact_points").reshape(len(solution.t), 3, 2, 3), 2, 0)
+    touching = np.linalg.norm(forces, axis=2) > 0
+    np.testing.assert_allclose(at[touching][:, 0], 0.0025, atol=1e-9)
+    for k, height in ((1, -0.0058), (2, 0.0058)):
+        np.testing.assert_allclose(at[:, k, 1] - solution["y"], height + 0.0031 * solution["sleeve"], atol=1e-12)
+    frames = solution.rows("frames").reshape(len(solution.t), -1, 12)[:, solution.module.metadata.bodies.index("bird_body")]
+    np.testing.assert_allclose(at[:, 0, 1], frames[:, 1] + 0.02 - 0.0201 * solution["bird"], atol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["simplest_walker", "rocking_block", "woodpecker_toy"])
 def test_benches_of_smooth_motions_leave_them_out(name: str) -> None:
     with pytest.raises(SymdynError, match="its motion switches at rigid contacts, and references are of smooth equations"):
