@@ -86,13 +86,14 @@ def arrows_of(solution: Solution, length: float, forces: bool = False) -> list[A
     """The arrows of a motion: forces of contacts, where there are some.
 
     length   of the mechanism, m
-    forces   with forces in joints and of loads and weights, to one scale, and torques of loads; what is zero all the
-             time, or rounding, is left out
+    forces   with forces in joints and of loads and weights, all forces to one scale, and torques of loads; what is zero all
+             the time, or rounding, is left out
     """
     found = [*_contacts(solution, length)]
     if forces:
         others = [one for kind in (_joints, _loads, _weights) for one in kind(solution)]
-        common = max([one.largest for one in others if not one.turns], default=0.0)
+        common = max([*[one.largest for one in others if not one.turns], *[usual(one.vectors) for one in found]], default=0.0)
+        found = [replace(one, scale=LARGEST * length / common) for one in found]
         strongest = max([common, *[one.largest for one in found]])
         for one in others:
             least = _ROUNDING * (max(one.largest, strongest * length) if one.turns else strongest)

@@ -193,7 +193,11 @@ def test_rounding_in_joints_without_forces_is_no_arrow() -> None:
     """A joint that leaves a body free transmits nothing but rounding, which has neither an arrow nor a check box."""
     solution = sd.systems.rocking_block().compile(backend="numpy").simulate((0, 0.5))
     assert 0 < np.abs(solution.rows("reactions")).max() < 1e-6
-    assert [one.layer for one in arrows_of(solution, 1.0, forces=True)] == ["contacts", "weights"]
+    contacts, weights = arrows_of(solution, 1.0, forces=True)
+    assert (contacts.layer, weights.layer) == ("contacts", "weights")
+    # Equal forces are equally long.
+    assert contacts.scale == weights.scale == pytest.approx(LARGEST / (1000 * 9.81))
+    assert arrows_of(solution, 1.0)[0].scale < weights.scale
 
 
 def test_colours_of_arrows_can_be_told_apart() -> None:
