@@ -95,7 +95,7 @@ class Linearization:
 
     def _repr_html_(self) -> str:
         """A with the names of its rows and columns, as a notebook shows it; the first rows and columns of many."""
-        rows = [(f"d/dt {name}", *(f"{value:.4g}" for value in row[:ROWS]))
+        rows = [(f"d/dt {name}", *(f"{value + 0.0:.4g}" for value in row[:ROWS]))
                 for name, row in zip(self.states, self.A, strict=True)]
         more = f"<p>and {len(self.states) - ROWS} more columns</p>" if len(self.states) > ROWS else ""
         return titled(self, table(("A", *self.states[:ROWS]), rows), more)
