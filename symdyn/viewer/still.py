@@ -18,6 +18,8 @@ from symdyn.pictures.solids import color_of, filled
 _WIDE, _HIGH, _MARGIN = 260, 200, 12
 # The camera of the page: azimuth and elevation.
 _AZIMUTH, _ELEVATION = -0.95, 0.34
+# Room for a block that is alone on its rail, in its own sizes.
+_AROUND = 3.0
 # Radius of a circle at least, pixels.
 _LEAST = 3.0
 # What is left of a colour on faces that are turned away from the light.
@@ -41,11 +43,12 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind != "rail"]
     seen = np.concatenate([end for points, wide in room or [(shapes[0][1], 0.0)] for end in (points - wide, points + wide)])
     low, high = seen.min(axis=0), seen.max(axis=0)
-    span = np.maximum(high - low, 1e-9)
+    alone = len(room) == 1 < len(shapes)  # a block without a mechanism, which its rail tells apart from a box
+    span = np.maximum((high - low) * (_AROUND if alone else 1.0), 1e-9)
     scale = min((_WIDE - 2 * _MARGIN) / span[0], (_HIGH - 2 * _MARGIN) / span[1])
     middle = (low + high) / 2
     drawn = "".join(_text(points, wide, color, kind, scale, middle) for _, points, wide, color, kind in
-                    sorted(shapes, key=lambda shape: shape[0]))
+                    sorted(shapes, key=lambda shape: (shape[0], shape[-1] != "rail")))  # a rail goes through its block
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE} {_HIGH}" width="{_WIDE}" height="{_HIGH}" role="img" '
             f'aria-label="{escape(name)}">{drawn}</svg>')
 

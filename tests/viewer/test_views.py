@@ -399,6 +399,14 @@ def test_a_system_shows_a_picture_and_tables(name: str) -> None:
     assert all(f"<td>{body.name}</td>" in text for body in system.check().bodies[:12])
 
 
+def test_a_rail_goes_through_its_block() -> None:
+    """In the small picture the block is in front of its rail, and does not fill the picture where it is alone."""
+    svg = re.search(r"<svg .*?</svg>", sd.systems.vehicle_on_track()._repr_html_() or "")
+    assert svg is not None and svg[0].index("<polyline") < svg[0].index("<polygon")
+    (block,) = re.findall(r'polygon points="([^"]*)"', svg[0])
+    assert np.ptp(np.array(re.split("[ ,]", block), dtype=float).reshape(-1, 2), axis=0).max() < 100
+
+
 def test_small_pictures_have_loops_and_lines_to_other_bodies() -> None:
     """The rocker of a four-bar linkage stands on the ground; an axle goes from wheel to wheel, as wide as it is drawn."""
     loop = re.search(r"<svg .*?</svg>", sd.systems.four_bar()._repr_html_() or "")
