@@ -137,6 +137,8 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
         assert f'href="tutorials/{source.stem}.html"' in listed, source.stem
         assert page.count('class="highlight-python') > 2 and f"{source.stem}.ipynb" in page, source.stem
         assert 'class="highlight-text' in page or '<div class="formula">' in page, source.stem
+        views = re.search(r"^(?!plt)\w+\.(view|show)\(\)$", source.read_text(encoding="utf-8"), re.MULTILINE)
+        assert ("A notebook shows a page here" in page) == (views is not None) and "View(&#39;" not in page, source.stem
 
 
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:

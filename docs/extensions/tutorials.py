@@ -63,6 +63,8 @@ def block_of(output: dict[str, str]) -> str:
         return f"![{output['text']}](../../notebooks/results/{output['image']})"
     if "latex" in output:
         return f"$$\n{output['latex']}\n$$"
+    if re.fullmatch(r"View\(.*\)", output["text"]):
+        return "*A notebook shows a page here that turns, zooms and plays; the [gallery](../gallery.md) has such pages.*"
     return f"```text\n{output['text']}\n```"
 
 

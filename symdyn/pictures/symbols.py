@@ -9,6 +9,8 @@ _GREEK = frozenset("alpha beta gamma delta epsilon zeta eta theta iota kappa lam
                    "Gamma Delta Theta Lambda Xi Sigma Phi Psi Omega".split())
 # A letter, Greek or Latin, with an index or without.
 _SYMBOL = re.compile(r"([A-Za-z]+?)(?:_?(\d+)|_([A-Za-z0-9_]+)|)")
+# Letters that symbols on an axis have together at most.
+_SHORT = 10
 # Digits above the line.
 _RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
                         "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}"
@@ -37,11 +39,22 @@ def typeset(name: str) -> str:
 
 
 def axis_label(names: Sequence[str], title: str, unit: str) -> str:
-    """What an axis is called: up to three symbols, else the title of its curves; with the unit."""
+    """What an axis is called: up to three short symbols, else the title of its curves; with the unit.
+
+    >>> axis_label(["q1", "q2"], "coordinates", "rad"), axis_label(["q_hook_1", "q_hook_2"], "coordinates", "rad")
+    ('$q_{1}$, $q_{2}$ [rad]', 'coordinates [rad]')
+    """
     signs = [typeset(name) for name in names]
-    few = len(names) == 1 or (len(names) <= 3 and all(sign.startswith("$") for sign in signs))
+    short = all(sign.startswith("$") for sign in signs) and sum(map(_letters, signs)) <= _SHORT
+    few = len(names) == 1 or (len(names) <= 3 and short)
     label = ", ".join(signs) if few else title
     return f"{label} [{typeset_unit(unit)}]" if unit else label
+
+
+def _letters(sign: str) -> int:
+    """How many letters and digits a typeset name shows."""
+    without = re.sub(r"\\(mathrm|d?dot)|[${}_]", "", sign)
+    return len(re.sub(r"\\[A-Za-z]+", "x", without))
 
 
 def typeset_unit(unit: str) -> str:

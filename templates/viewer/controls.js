@@ -10,13 +10,13 @@ function element(parent, kind, name = "", text = "") {
 const GREEK = { alpha: "α", beta: "β", gamma: "γ", delta: "δ", epsilon: "ε", zeta: "ζ", eta: "η", theta: "θ", lambda: "λ", lamda: "λ", mu: "μ",
     nu: "ν", xi: "ξ", rho: "ρ", sigma: "σ", tau: "τ", phi: "φ", chi: "χ", psi: "ψ", omega: "ω", Delta: "Δ", Theta: "Θ", Phi: "Φ", Psi: "Ψ", Omega: "Ω" };
 
-// A name as it is typeset: theta_1_dot becomes θ with a dot and the index 1.
+// A name as it is typeset: theta_1_dot becomes θ with a dot and the index 1, q_free_2 a q with the index free, 2.
 function symbol(parent, name) {
-    const match = /^([A-Za-z]+?)_?(\d+|(?<=_)(?!d?dot$)[A-Za-z0-9]+|)(_d?dot|)$/.exec(name);
+    const match = /^([A-Za-z]+?)_?(\d+|(?<=_)(?!d?dot$)[A-Za-z0-9_]+?|)(_d?dot|)$/.exec(name);
     if (!match || !(match[1] in GREEK || match[1].length === 1)) return element(parent, "span", "symbol", name);
     const made = element(parent, "span", "symbol"), dots = match[3] === "_dot" ? "\u0307" : match[3] ? "\u0308" : "";
     element(made, "var", "", (GREEK[match[1]] || match[1]) + dots);
-    if (match[2]) element(made, "sub", "", match[2].replace(/^_/, ""));
+    if (match[2]) element(made, "sub", "", match[2].replace(/^_/, "").replaceAll("_", ", "));
     return made;
 }
 

@@ -150,6 +150,20 @@ def test_numbers_of_sliders_are_not_rounded_to_zero(chromium: Any, tmp_path: Pat
         assert shown[:2] == ["-0.012", "0"]
 
 
+def test_names_with_several_indices_are_typeset(chromium: Any, tmp_path: Path) -> None:
+    """Coordinates that joints name, as plots have them: the letter with its indices, without underscores."""
+    system = sd.System("box", gravity=[0, -9.81])
+    system.add_joint(sd.Planar("free", system.ground, system.add_body("box", mass=1, inertia=1)))
+    system.show(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        symbols = opened.page.eval_on_selector_all("#sliders .symbol", "all => all.map(e => e.innerHTML)")
+        assert symbols == [f"<var>q</var><sub>free, {k}</sub>" for k in (1, 2, 3)]
+        made = opened.page.evaluate("""["q_free_1_dot", "theta_1_dot", "x_dot", "steer_dot", "r_ball_p"].map(
+            name => symbol(document.createElement("p"), name).innerHTML)""")
+        assert made == ["<var>q\u0307</var><sub>free, 1</sub>", "<var>\u03b8\u0307</var><sub>1</sub>", "<var>x\u0307</var>",
+                        "steer_dot", "<var>r</var><sub>ball, p</sub>"]
+
+
 def test_euler_parameters_keep_unit_length(chromium: Any, tmp_path: Path) -> None:
     system = sd.System("top", gravity=[0, 0, -9.81])
     body = system.add_body("body", mass=1, inertia=[0.1, 0.2, 0.3])
