@@ -186,6 +186,27 @@ def test_friction_of_a_joint_holds_along_with_contacts_and_impacts() -> None:
     assert solution.contacts["friction"].mode[-1] == "sticking"
 
 
+@pytest.mark.parametrize("options", [{}, {"max_steps": 100_000}], ids=["C", "Python"])
+def test_impact_tears_a_clutch_that_holds_which_slips_until_it_holds_again(options: dict[str, int]) -> None:
+    """Rotors held by a clutch of finite torque F: a stop turns one of them back, its impulse is that of this one alone."""
+    I_1, I_2, F, w, e, end = 0.8, 1.2, 4.0, 10.0, 0.5, 10.0
+    system = rotors(I_1, I_2)
+    system.add_contact(sd.JointFriction("disc", "a", breakaway=1.25 * F, sliding=F, other="b"))
+    system.add_contact(sd.Stop("end", "b", upper=end, restitution=e))
+    solution = system.compile().simulate((0, 5), u=[w, 0.0], rtol=1e-12, **options)
+    rate = F / I_1 + F / I_2
+    common = I_1 * w / (I_1 + I_2)
+    first = w / rate
+    hit = first + (end - F / I_2 * first**2 / 2) / common
+    again = hit + (1 + e) * common / rate
+    disc, stop = solution.contacts["disc"], solution.contacts["end_upper"]
+    assert [mode for _, mode in disc.switches] == ["sliding", "sticking", "sliding", "sticking"]
+    assert np.array([t for t, _ in disc.switches]) == pytest.approx([0, first, hit, again], abs=1e-10)
+    assert stop.impacts.t == pytest.approx([hit], abs=1e-10)
+    assert stop.impacts.impulse[0, 0] == pytest.approx(I_2 * (1 + e) * common, rel=1e-11)
+    assert solution.u[-1] == pytest.approx([(I_1 - e * I_2) * common / (I_1 + I_2)] * 2, rel=1e-10)
+
+
 def test_faults_of_elements_are_reported_together() -> None:
     system = rotors(1.0, 1.0)
     ball = system.add_body("ball", mass=1.0, inertia=[1, 1, 1])

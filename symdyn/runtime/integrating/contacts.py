@@ -935,6 +935,9 @@ class _Phases:
         for k in touching:
             if k not in rebound and self.modes[k] == OPEN:
                 self.modes[k] = SLIDING
+        struck = self._numbers(t, after)
+        for k in self.frictions:  # their forces are finite: an impact may tear the joints that they hold
+            self.still[k] = self._slow(struck, k)
         return self._onto_surfaces(t, after), rebound
 
     def _kinetic_energy(self, t: float, x: np.ndarray) -> float:

@@ -200,6 +200,8 @@ static int symdyn_impact(symdyn_hybrid *h, int n, const int *contact, const int 
         else if (h->mode[k] == SYMDYN_OPEN)
             h->mode[k] = SYMDYN_SLIDING;
     }
+    for (int k = 0; k < h->n_contacts; k++)  // their forces are finite: an impact may tear the joints that they hold
+        if (!h->normal[k]) h->still[k] = symdyn_slow(h, k);
     return symdyn_onto_surfaces(h, h->t, h->x);
 }
 
