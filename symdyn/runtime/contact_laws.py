@@ -34,6 +34,8 @@ STEPS, SMALL_ANGLE = 20, 1e-7
 DIFFERENT = 1e-6
 # Singular values below this part of the largest: rows that depend on each other.
 DEPENDENT = 1e-10
+# A tangent that is left this part of its mobility where other rows hold does not move.
+KEPT = 1e-9
 # Directions that are tried first where a contact in space begins to slide.
 DIRECTIONS = 48
 # Times that each direction is put right for the others, where all at once do not converge.
@@ -79,11 +81,16 @@ class Site:
 
 @dataclass(frozen=True)
 class Mode:
-    """What one contact does: OPEN, STICKING or SLIDING, the direction of its slip, whether its normal row holds."""
+    """What one contact does: OPEN, STICKING or SLIDING, the direction of its slip, whether its normal row holds.
+
+    kept   whether it has the friction of SLIDING, but other contacts keep it from slipping; the direction is then longer than a
+           unit vector, so that kinetic friction times that is static friction
+    """
 
     kind: str
     direction: np.ndarray
     held: bool
+    kept: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,17 +107,65 @@ class Solved:
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
     """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS in a plane.
 
-    What static friction can hold does not begin to slide: kinetic friction, where it is less, counts for what slides then.
+    What static friction can hold does not begin to slide: kinetic friction, where it is less, counts for what slides then. A
+    contact that others keep from slipping while its own friction is at its bound has static friction, see Mode.kept.
     """
-    steep = [k for k, site in enumerate(sites) if site.slip is None and site.kinetic != site.static and site.tangents
-             and STICKING not in site.excluded]
-    if steep:
-        found = []
-        for one in solutions(D, b, [replace(site, kinetic=site.static) if k in steep else site for k, site in enumerate(sites)]):
-            slides = [k for k in steep if one.modes[k].kind == SLIDING]
-            found += solutions(D, b, [replace(site, excluded=(*site.excluded, STICKING)) if k in slides else site
-                                      for k, site in enumerate(sites)]) if slides else [one]
-        return _different(b, found)
+    return _with_static_friction(D, b, sites, ())
+
+
+def _with_static_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], slipping: Sequence[int]) -> list[Solved]:
+    """The same, where it is known which of the sites begin to slip."""
+    steep = []
+    for k, site in enumerate(sites):
+        if site.slip is not None or not site.tangents or k in slipping:
+            continue
+        if (site.kinetic != site.static and STICKING not in site.excluded) or _may_be_kept(D, sites, k):
+            steep.append(k)
+    if not steep:
+        return _of_one_friction(D, b, sites)
+    found = []
+    for one in _of_one_friction(D, b, [replace(site, kinetic=site.static) if k in steep else site
+                                       for k, site in enumerate(sites)]):
+        slides = [k for k in steep if one.modes[k].kind == SLIDING]
+        kept = [k for k in slides if _may_be_kept(D, sites, k) and _is_kept(D, sites, one.modes, k)]
+        slides = [k for k in slides if k not in kept]
+        if slides:
+            found += _with_static_friction(D, b, [replace(site, excluded=tuple({*site.excluded, STICKING})) if k in slides
+                                                  else site for k, site in enumerate(sites)], (*slipping, *slides))
+        else:
+            modes = [replace(mode, direction=mode.direction * (sites[k].static / sites[k].kinetic), kept=True) if k in kept
+                     else mode for k, mode in enumerate(one.modes)]
+            found.append(replace(one, modes=tuple(modes)))
+    return _different(b, found)
+
+
+def _may_be_kept(D: np.ndarray, sites: Sequence[Site], k: int) -> bool:
+    """Whether other rows, if they held, would keep a site from slipping, and whether its static friction can be written as a
+    multiple of the kinetic one, in a given direction."""
+    site = sites[k]
+    if len(sites) == 1 or len(site.tangents) != 1 or site.kinetic == 0:
+        return False
+    return _moves_with(D, site.tangents[0], [row for row in range(len(D)) if row != site.tangents[0]])
+
+
+def _is_kept(D: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], k: int) -> bool:
+    """Whether the rows that hold keep a site from slipping."""
+    held = [site.rows[0] for site, mode in zip(sites, modes, strict=True) if site.normal is not None and mode.held]
+    held += [row for site, mode in zip(sites, modes, strict=True) if mode.kind == STICKING for row in site.tangents]
+    return _moves_with(D, sites[k].tangents[0], held)
+
+
+def _moves_with(D: np.ndarray, row: int, held: Sequence[int]) -> bool:
+    """Whether a row does not move where others do not."""
+    if not held:
+        return False
+    along = D[held, row]
+    left = D[row, row] - along @ np.linalg.lstsq(D[np.ix_(held, held)], along, rcond=DEPENDENT)[0]
+    return bool(left <= KEPT * D[row, row])
+
+
+def _of_one_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
+    """Solutions where what begins to slide has kinetic friction at once."""
     if _is_simple(sites):
         return (_one_bounded if sites[0].bounded else _one)(D, b, sites[0])
     options = [list(_options(site)) for site in sites]
@@ -199,7 +254,7 @@ def _different(b: np.ndarray, found: Sequence[Solved]) -> list[Solved]:
 def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved) -> list[int]:
     """Sites on the border of two modes, which both give these accelerations: those that neither press nor leave, and those whose
     friction is at its bound without slip. Those of which a mode is ruled out are there because they change it."""
-    if one.shared:
+    if one.shared or any(mode.kept for mode in one.modes):
         return []
     size = float(np.abs(b).max(initial=0.0))
     force = max(float(np.abs(one.lam).max(initial=0.0)), size / max(float(np.diag(D).max(initial=0.0)), 1e-300))

@@ -57,6 +57,23 @@ def test_ball_meets_the_times_of_its_impacts_and_their_limit() -> None:
     assert np.array_equal(solution.events["floor_closes"].t, floor.impacts.t)
 
 
+@pytest.mark.parametrize("friction", [(0.5, 0.5), (0.5, 0.4)])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_box_on_two_corners_is_pushed_off_where_all_of_its_static_friction_is_used(friction: Any, speed: float) -> None:
+    """A force c t in the middle loads the corners unequally: one of them is at its bound before, and does not slip. From there on
+    m v_dot = c t - mu m g; a slip at the start ends before."""
+    (static, kinetic), c, mass, end = friction, 3.0, 2.0, 5.0
+    system = box(friction, 0.0)
+    system.add_force("body", [c * sd.t, 0])
+    solution = system.compile().simulate((0, end), q={"y": 0.1}, u={"x_dot": speed}, rtol=1e-11)
+    begins = static * mass * G / c
+    for name in ("corner_1", "corner_3"):
+        assert solution.contacts[name].switches[-1] == pytest.approx((begins, SLIDING), abs=1e-9)
+    rested = solution.t < begins
+    assert np.abs(solution["x_dot"][rested & (solution.t > 0.2)]).max() < 1e-9
+    assert solution["x_dot"][-1] == pytest.approx(c * (end**2 - begins**2) / 2 / mass - kinetic * G * (end - begins), rel=1e-9)
+
+
 def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:
     """It slips from mu_s m g/k on, x = x_k + R cos(w t - phi), until its speed is the belt's again."""
     static, kinetic, speed, k = 0.5, 0.3, 0.2, 100.0

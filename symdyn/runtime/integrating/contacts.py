@@ -418,8 +418,9 @@ class _Phases:
 
     def _is_plain(self) -> bool:
         """Whether nothing is under way at a switch, or before a phase, that C does not know of."""
-        return not (self.begins.directions or self.begins.since or self.unlooked or self.ruled_out or self.at_once or self.shared
-                    or self.until < np.inf)
+        kept = any(still and mode == SLIDING for still, mode in zip(self.still, self.modes, strict=True))
+        return not (kept or self.begins.directions or self.begins.since or self.unlooked or self.ruled_out or self.at_once
+                    or self.shared or self.until < np.inf)
 
     def _quickly(self, quick: Motion) -> bool:
         """Go on in C as far as that goes; whether it is the end."""
@@ -703,7 +704,7 @@ class _Phases:
                       SLIDING: ("opens", "sticks", "turns")}[mode]
             for what, k in own.items():
                 look[k] = what in wanted and k not in self.unlooked
-            directed = mode == SLIDING and self.directions[j].any()
+            directed = mode == SLIDING and self.directions[j].any() and not self.still[j]
             if "sticks" in own and (held or not directed):
                 look[own["sticks"]] = False
             if "turns" in own and (held or not directed or j in self.begins.since):
@@ -994,9 +995,9 @@ class _Phases:
         for k, mode in zip(closed, found[0].modes if found else (), strict=True):
             self.modes[k] = mode.kind
             self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].tangents)
-            if self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0:
+            if self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0 and not mode.kept:
                 begins[k] = self.directions[k]
-            self.still[k] = mode.kind == STICKING
+            self.still[k] = mode.kept or mode.kind == STICKING
         self.begins.switched(t, begins, {k: record.tangents == 2 for k, record in enumerate(self.records)
                                          if self.modes[k] == SLIDING})
 
