@@ -154,10 +154,12 @@ class GroupRecord(NamedTuple):
 
 
 class CompliantRecord(NamedTuple):
-    """A compliant contact in one place, and its number of rows."""
+    """A compliant contact in one place, its number of rows, and the least numbers that its parameters may be: what each is of the
+    contact, its name, the number, whether that itself is one."""
 
     name: str
     rows: int
+    least: tuple[tuple[str, str, float, bool], ...] = ()
 
 
 class Chart(NamedTuple):

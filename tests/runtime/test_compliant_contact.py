@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import quad
 
 import symdyn as sd
-from symdyn.errors import ModelError, SimulationWarning
+from symdyn.errors import ArgumentError, ModelError, SimulationWarning
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 
 G, TILT, MU, STIFFNESS = 9.81, np.radians(20), 0.5, 1e6
@@ -36,6 +37,50 @@ def test_hertz_takes_numbers_and_expressions_and_never_evaluates_text(capsys: py
         C.hertz("print('evaluated')", 2.1e11, "0.3")
     assert "hertz: radius" in str(caught.value) and "hertz: poisson" in str(caught.value)
     assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(("given", "wrong"), [
+    ((0, 2.1e11), "radius is 0; pass a number above 0"), ((0.01, -1.0), "modulus is -1.00000000000000; pass a number above 0"),
+    ((0.01, 2.1e11, 1), "poisson is 1; pass Poisson's ratio"), ((0.01, 2.1e11, 0.3, 0.02, 2.1e11, 0.6), "poisson_b is 0.6"),
+    ((0.5, 2.1e11, 0.3, -0.25), "radius_b -0.25")])
+def test_hertz_rejects_what_no_material_or_pair_of_shapes_has(given: tuple[float, ...], wrong: str) -> None:
+    with pytest.raises(sd.ModelError, match=wrong):
+        C.hertz(*given)
+
+
+def test_hertz_of_a_sphere_in_a_hollow_one() -> None:
+    """1/R = 1/0.1 - 1/0.2."""
+    assert float(C.hertz(0.1, 1e9, 0.3, -0.2)) == pytest.approx(4 / 3 * 1e9 / 0.91 * np.sqrt(0.2), rel=1e-14)
+
+
+def test_parameters_that_no_compliance_has_are_rejected_in_runs_and_fail_alone_in_batches() -> None:
+    stiffness, mu, slip_speed = sd.parameters("stiffness mu slip_speed")
+    system = sd.System("ball", gravity=[0, -G])
+    system.defaults = {stiffness: 1e4, mu: 0.3, slip_speed: 1e-2}
+    ball = system.add_body("ball", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, ball, sd.coordinates("x y theta")))
+    system.add_contact(sd.Contact("floor", ball, system.ground, friction=mu, law="compliant",
+                                  compliance=C.Compliance(stiffness, exponent=1, slip_speed=slip_speed)))
+    module = system.compile()
+    with pytest.raises(ArgumentError, match=r"static friction of contact floor is -0\.1; pass a number from 0 on; "
+                                            r"kinetic friction.*stiffness of contact floor is 0; pass a number above 0"):
+        module.simulate((0, 0.1), params={stiffness: 0.0, mu: -0.1, slip_speed: -1.0})
+    batch = module.simulate_batch(q={"y": 0.01}, params={"mu": [0.3, -0.1, 0.2]}, t=np.linspace(0, 0.1, 3))
+    assert batch.success.tolist() == [True, False, True]
+    assert "static friction of contact floor is -0.1" in batch.messages[1]
+
+
+@pytest.mark.parametrize(("law", "wrong"), [
+    ({"stiffness": None}, "stiffness is None of type NoneType"), ({"stiffness": float("nan")}, "stiffness is nan; pass a finite"),
+    ({"stiffness": 1e4, "slip_speed": "slow"}, "slip_speed is the text 'slow'"),
+    ({"stiffness": 1e4, "depth": sp.Symbol("deep")}, "depth is deep; pass a number, in m")])
+def test_what_is_no_number_of_a_compliance_is_named(law: dict[str, Any], wrong: str) -> None:
+    system = sd.System("ball")
+    ball = system.add_body("ball", mass=1.0)
+    system.add_joint(sd.Prismatic("height", system.ground, ball))
+    system.add_contact(sd.Contact("floor", ball, "ground", law="compliant", compliance=C.Compliance(**law)))
+    with pytest.raises(sd.ModelError, match=wrong):
+        system.check()
 
 
 def test_spheres_part_after_hertzs_time() -> None:

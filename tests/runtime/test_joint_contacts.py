@@ -1,5 +1,8 @@
 """Stops, backlash, one-way clutches and dry friction of joints, and ropes, against closed forms."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -229,6 +232,18 @@ def test_faults_of_elements_are_reported_together() -> None:
                  "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1", "is between ball and ball",
                  "is between ball and bal;"):
         assert part in message, part
+
+
+@pytest.mark.parametrize(("element", "wrong"), [
+    (lambda: sd.Contact("heel", ["body_a"], "ground"), r"contact 'heel' is between"),
+    (lambda: sd.Rope("tether", ["body_a"], "ground", 1.0), r"rope 'tether' is between \['body_a'\] and ground"),
+    (lambda: sd.ContactGroup("grains", [["body_a"]], sd.contacts.Sphere(1.0)), "is not free"),
+    (lambda: sd.OneWayClutch("freewheel", "a", direction=np.array([1, 1])), r"direction is array\(\[1, 1\]\); pass 1 or -1")])
+def test_lists_where_one_thing_is_wanted_are_faults(element: Callable[[], Any], wrong: str) -> None:
+    system = rotors(1.0)
+    system.add_contact(element())
+    with pytest.raises(ModelError, match=wrong):
+        system.check()
 
 
 def test_overlapping_stops_and_ropes_are_rejected_at_the_start() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy as sp
 
@@ -79,26 +79,50 @@ def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scal
           modulus_b: Scalar | None = None, poisson_b: Scalar = 0.3) -> sp.Expr:
     """The stiffness 4/3 E* sqrt(R) of Hertz's contact of a sphere with a plane or a sphere, N/m^(3/2).
 
-    radius, modulus, poisson   of the sphere on a, m and Pa; radius_b: of that on b, None: a plane
+    radius, modulus, poisson   of the sphere on a, m and Pa; radius_b: of that on b, of a hollow one negative; None: a plane
     modulus_b, poisson_b       of the material of b; None: as rigid
 
-    Raises ModelError with everything that is neither a number nor an expression; text is never evaluated.
+    Raises ModelError with everything that is neither a number nor an expression (text is never evaluated), and with numbers that
+    no material or pair of shapes has.
 
     >>> round(float(sd.contacts.hertz(0.01, 2.1e11) / 1e10), 3)
     3.077
     """
     faults = Faults()
-    R, E, nu = (faults.expression(value, f"hertz: {what}") for what, value in (
-        ("radius", radius), ("modulus", modulus), ("poisson", poisson)))
-    yielding, curved = (1 - nu**2) / E, 1 / R
+    wanted: dict[str, Any] = {"radius": radius, "modulus": modulus, "poisson": poisson}
+    wanted |= {what: value for what, value in (("radius_b", radius_b), ("modulus_b", modulus_b)) if value is not None}
     if modulus_b is not None:
-        nu_b = faults.expression(poisson_b, "hertz: poisson_b")
-        yielding = yielding + (1 - nu_b**2) / faults.expression(modulus_b, "hertz: modulus_b")
-    if radius_b is not None:
-        curved = curved + 1 / faults.expression(radius_b, "hertz: radius_b")
+        wanted["poisson_b"] = poisson_b
+    known = {what: faults.expression(value, f"hertz: {what}") for what, value in wanted.items()}
     if faults:
         raise ModelError(list(faults), "contact")
+    for what, value in known.items():
+        if what.startswith("poisson") and value.is_number and not -1 < value <= 0.5:
+            faults.append(f"hertz: {what} is {value}; pass Poisson's ratio, above -1 and up to 0.5")
+        elif not what.startswith("poisson") and what != "radius_b" and value.is_number and not value > 0:
+            faults.append(f"hertz: {what} is {value}; pass a number above 0")
+    R, E, nu = (known[what] for what in ("radius", "modulus", "poisson"))
+    R_b = known.get("radius_b", sp.oo)
+    if R_b == 0 or (not faults and R.is_number and R_b.is_number and not 1 / R + 1 / R_b > 0):
+        faults.append(f"hertz: radius is {R} and radius_b {R_b}; pass a positive radius_b of a sphere, or of a hollow one a "
+                      "negative one, larger than that of the sphere inside")
+    if faults:
+        raise ModelError(list(faults), "contact")
+    yielding, curved = (1 - nu**2) / E, 1 / R
+    if modulus_b is not None:
+        yielding = yielding + (1 - known["poisson_b"]**2) / known["modulus_b"]
+    if radius_b is not None:
+        curved = curved + 1 / known["radius_b"]
     return sp.Rational(4, 3) / yielding / sp.sqrt(curved)
+
+
+class Least(NamedTuple):
+    """The least number that a parameter may be, what it is of a contact, and whether that number itself is one."""
+
+    what: str
+    parameter: str
+    least: float
+    reached: bool
 
 
 @dataclass(frozen=True)
@@ -150,20 +174,35 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
     return Law((normal, *forces), tuple(rates), kinks)
 
 
+def _least(given: Compliance) -> list[tuple[str, Any, float, bool]]:
+    """The numbers of a compliance, with the least that each may be, and whether that itself is one."""
+    found: list[tuple[str, Any, float, bool]] = [
+        ("stiffness", given.stiffness, 0.0, False), ("exponent", given.exponent, 1.0, True),
+        ("dissipation", given.dissipation, 0.0, True), ("slip_speed", given.slip_speed, 0.0, False),
+        ("viscous", given.viscous, 0.0, True)]
+    found += [("stribeck", given.stribeck, 0.0, False)] * (given.stribeck is not None)
+    found += [("depth", given.depth, 0.0, False)] * (given.depth is not None)
+    if isinstance(given.bristles, Bristles):
+        found += [("stiffness of bristles", given.bristles.stiffness, 0.0, False),
+                  ("damping of bristles", given.bristles.damping, 0.0, True)]
+    return found
+
+
+def least_of_parameters(given: Compliance, static: sp.Expr, kinetic: sp.Expr) -> tuple[Least, ...]:
+    """What parameters that are numbers of a compliant contact may be at least."""
+    friction = [("static friction", static, 0.0, True), ("kinetic friction", kinetic, 0.0, True)]
+    return tuple(Least(what, value.name, least, reached) for what, value, least, reached in [*friction, *_least(given)]
+                 if isinstance(value, sp.Symbol))
+
+
 def compliance_faults(where: str, given: Any, numbers: Any, kinetic: Any) -> list[str]:
     """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
     found = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]
-    checks: list[tuple[str, Any, float, bool]] = [
-        ("stiffness", given.stiffness, 0.0, False), ("exponent", given.exponent, 1.0, True),
-        ("dissipation", given.dissipation, 0.0, True), ("slip_speed", given.slip_speed, 0.0, False),
-        ("viscous", given.viscous, 0.0, True)]
-    checks += [("stribeck", given.stribeck, 0.0, False)] * (given.stribeck is not None)
-    checks += [("depth", given.depth, 0.0, False)] * (given.depth is not None)
+    if isinstance(given.depth, sp.Basic) and not given.depth.is_number:
+        found.append(f"{where}: depth is {given.depth}; pass a number, in m")
     if isinstance(given.bristles, Bristles):
-        checks += [("stiffness of bristles", given.bristles.stiffness, 0.0, False),
-                   ("damping of bristles", given.bristles.damping, 0.0, True)]
         part = None if given.bristles.elastic is None else numbers(given.bristles.elastic)
         if part is not None and not 0 <= part < 1:
             found.append(f"{where}: elastic part of bristles is {part:g}; pass a number from 0 to below 1, or None for the LuGre "
@@ -172,8 +211,11 @@ def compliance_faults(where: str, given: Any, numbers: Any, kinetic: Any) -> lis
             found.append(f"{where}: bristles need friction; pass friction, or leave bristles out")
     elif given.bristles is not None:
         found.append(f"{where}: bristles is {shown(given.bristles)}; pass sd.contacts.Bristles(...), or None")
-    for what, value, least, reached in checks:
-        number = numbers(value)
+    for what, value, least, reached in _least(given):
+        wrong = Faults()
+        wrong.expression(value, f"{where}: {what}")
+        found += wrong
+        number = None if wrong else numbers(value)
         if number is not None and not (number >= least if reached else number > least):
             found.append(f"{where}: {what} is {number:g}; pass a number {'from' if reached else 'above'} {least:g}"
                          f"{' on' if reached else ''}")

@@ -97,7 +97,7 @@ def lowered(system: System, group: ContactGroup, faults: Faults) -> LoweredGroup
     ends = [body for j in system.loops for body in (getattr(j, "parent", None), getattr(j, "child", None))]
     closed = {getattr(body, "name", body) for body in ends}
     wanted, spheres = FREE_JOINT[system.planar], []
-    names = [getattr(body, "name", body) for body in group.bodies]
+    names = [name if isinstance(name, str) else shown(name) for name in (getattr(body, "name", body) for body in group.bodies)]
     twice = [str(name) for name, count in Counter(names).items() if count > 1]
     if twice:
         faults.append(f"{group.where}: {', '.join(sorted(twice))} is in it twice; name each body once")

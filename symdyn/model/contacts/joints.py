@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.contact_kinds import CLUTCH, FRICTION, STOP
@@ -203,7 +204,8 @@ class OneWayClutch(JointElement):
         super().__init__(name, "one-way clutch")
         self.joint, self.other, self.direction = joint, other, direction
         self.ratio = self.faults.expression(ratio, f"{self.where}: ratio")
-        if isinstance(direction, bool) or direction not in (1, -1):
+        number = isinstance(direction, (int, float, np.number, sp.Number)) and not isinstance(direction, bool)
+        if not number or direction not in (1, -1):
             self.faults.append(f"{self.where}: direction is {shown(direction)}; pass 1 or -1")
             self.direction = 1
 
@@ -276,9 +278,10 @@ class Rope(JointElement):
     def rows(self, system: System, faults: Faults) -> list[Row]:
         known = {"ground", *[b.name for b in system.bodies]}
         names = [getattr(body, "name", body) for body in (self.a, self.b)]
-        strange = [str(name) for name in names if name not in known]
+        strange = [name for name in names if not isinstance(name, str) or name not in known]
         if strange or names[0] == names[1]:
-            faults.append(f"{self.where} is between {names[0]} and {names[1]}; pass two different bodies of the system: "
+            between = [name if isinstance(name, str) else shown(name) for name in names]
+            faults.append(f"{self.where} is between {' and '.join(between)}; pass two different bodies of the system: "
                           f"{', '.join(sorted(known))}")
             return []
         at = self.at = [faults.vector(p, f"{self.where}: {what}", system.planar)

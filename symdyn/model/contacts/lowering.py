@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.contact_kinds import BODIES, FRICTION
-from symdyn.model.contacts.compliance import Compliance, law_of
+from symdyn.model.contacts.compliance import Compliance, Least, law_of, least_of_parameters
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
 from symdyn.model.contacts.group import lowered
@@ -25,6 +25,7 @@ from symdyn.model.loads import Force, Torque
 from symdyn.model.quantity import Measure, Quantity
 from symdyn.model.state import State
 from symdyn.model.symbols import Coordinate
+from symdyn.shown import shown
 from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class RigidContact:
 @dataclass(frozen=True)
 class CompliantContact:
     """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, and the depth
-    that is reported, m; where it touches and the force on body a, n-frame."""
+    that is reported, m; where it touches and the force on body a, n-frame; the least numbers that its parameters may be."""
 
     name: str
     gap: sp.Expr
@@ -103,6 +104,7 @@ class CompliantContact:
     depth: float | None
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
+    least: tuple[Least, ...] = ()
 
     @property
     def expressions(self) -> list[sp.Expr]:
@@ -155,11 +157,12 @@ def with_contacts(system: System) -> System:
 
 def _body_faults(contact: Contact, known: set[str]) -> list[str]:
     a, b = (getattr(body, "name", body) for body in (contact.a, contact.b))
-    if a == b:
+    names = [body if isinstance(body, str) else shown(body) for body in (a, b)]
+    strange = [name for name in names if name not in known]
+    if not strange and a == b:
         return [f"{contact.where}: {a} is in contact with itself; pass two different bodies"]
-    if a == "ground":
+    if not strange and a == "ground":
         return [f"{contact.where}: body a is the ground; pass the body that moves first, and the ground as b"]
-    strange = [str(body) for body in (a, b) if body not in known]
     return [f"{contact.where} is between {', '.join(map(repr, strange))}, which the system does not have; bodies: "
             f"{', '.join(sorted(known))}"] if strange else []
 
@@ -223,7 +226,8 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     system.states += [State(z, rate) for z, rate in zip(deflections, law.rates, strict=True)]
     slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
-                                                      geometry.place(touch), _along(directions, law.forces)))
+                                                      geometry.place(touch), _along(directions, law.forces),
+                                                      least_of_parameters(compliance, contact.static, contact.kinetic)))
     _act(system, geometry, touch, directions, law.forces)
     if compliance.located:
         stays = next(q for joint in system.joints for q in joint.coordinates if isinstance(q, Coordinate))

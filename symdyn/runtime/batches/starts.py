@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.errors import SymdynError
+from symdyn.runtime.compliance import impossible
 from symdyn.runtime.consistent import CONSISTENT, check_start, normalised
 from symdyn.runtime.constraints import length, names, position_residual, velocity_residual
 
@@ -29,11 +30,13 @@ def consistent_starts(module: Module, t: float, starts: np.ndarray, params: np.n
     n        motions
     The lengths, m, are (n, 1) or (1, 1).
     """
-    if not projects(module):
+    astray = impossible(module, params)
+    if not projects(module) and not astray:
         return starts, np.ones((1, 1)), {}
     lengths = np.ones((len(params), 1))
     starts = np.array(np.broadcast_to(starts, (max(len(starts), len(params)), starts.shape[1])))
-    astray: dict[int, str] = {}
+    if len(params) == 1 and astray:
+        astray = dict.fromkeys(range(len(starts)), astray[0])
     for k in range(len(starts)) if module.metadata.unit_groups else ():
         try:
             starts[k] = normalised(module, starts[k])
