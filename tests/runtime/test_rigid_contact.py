@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import symdyn as sd
@@ -72,6 +74,31 @@ def test_box_on_two_corners_is_pushed_off_where_all_of_its_static_friction_is_us
     rested = solution.t < begins
     assert np.abs(solution["x_dot"][rested & (solution.t > 0.2)]).max() < 1e-9
     assert solution["x_dot"][-1] == pytest.approx(c * (end**2 - begins**2) / 2 / mass - kinetic * G * (end - begins), rel=1e-9)
+
+
+def test_block_lifts_off_a_shaken_table_in_every_period() -> None:
+    """It leaves where a w^2 sin(w t) = g, with the acceleration zero, so that rounding passes the zero of the gap; and is back,
+    without restitution, where its parabola meets the table."""
+    a, w = 0.05, 20.0
+    system = sd.System("table", gravity=[0, -G])
+    table, block = system.add_body("table"), system.add_body("block", mass=1.5)
+    system.add_joint(sd.Prismatic("lift", system.ground, table, axis=[0, 1], coordinate=a * sp.sin(w * sd.t)))
+    system.add_joint(sd.Prismatic("height", system.ground, block, axis=[0, 1], coordinate=sd.coordinates("y")))
+    system.add_contact(sd.Contact("sole", block, table))
+    module = system.compile()
+    leaves = np.arcsin(G / (a * w**2)) / w
+    y, v = a * np.sin(w * leaves), a * w * np.cos(w * leaves)
+    lands = brentq(lambda t: y + v * (t - leaves) - G * (t - leaves) ** 2 / 2 - a * np.sin(w * t), leaves + 0.05, leaves + 0.3,
+                   xtol=1e-15)
+    for end in (0.7, 1.0, 1.3, 3.0):
+        for max_steps in (None, 100_000):  # in C, in Python
+            solution = module.simulate((0, end), u=[a * w], rtol=1e-10, max_steps=max_steps)
+            assert solution.success
+            periods = 2 * np.pi / w * np.arange(10)
+            sole = solution.contacts["sole"]
+            opened = [t for t, mode in sole.switches if mode == OPEN]
+            assert opened == pytest.approx([t for t in leaves + periods if t < end], abs=1e-10)
+            assert sole.impacts.t == pytest.approx([t for t in lands + periods if t < end], abs=1e-10)
 
 
 def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:

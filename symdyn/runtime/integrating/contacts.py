@@ -62,6 +62,8 @@ CODE_OF = {mode: k for k, mode in enumerate(MODES)}
 LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWEST_FLIGHT)
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
+# Part of the run for which a contact that has opened without a speed is near enough to count as leaving.
+LEAVES = 1e-5
 # A speed, m/s, that no slip comes near: added to the slip it holds the direction of friction.
 HOLDS = 1e30
 
@@ -357,6 +359,7 @@ class _Phases:
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
         self.closing: set[int] = set()  # at the latest switch
+        self.left: dict[int, float] = {}  # when contacts opened since nothing pressed them any more
         self.ends = SlipEnds()  # of the phase
         self.latest_time = begin  # of a switch that changes the motion
 
@@ -518,6 +521,7 @@ class _Phases:
     def _recall(self, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note a switch; raise _Stop where those of late have been too many."""
         self.recent.append((t, tuple([k for k, _ in fired])))
+        self.left |= {k: t for k, what in fired if what == "opens"}
         begin, end = self.request.span
         if self.request.step and len(self.recent) >= MOST_FAST:
             passed_by = t - self.recent[-MOST_FAST][0]
@@ -808,13 +812,17 @@ class _Phases:
         self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0),
                         np.abs(at.gap[self.placed]).max(initial=0.0))
         closing = {k for k, what in fired if what == "closes"}
+        for k in [k for k in closing if self._is_leaving(k, t, x, at)]:
+            closing.discard(k)
+            self.unlooked.add(self.events[k]["closes"])
+            self.until = t + max(GRACE * (self.request.span[1] - self.request.span[0]), t - self.left[k])
         if start:
             for k in self.frictions:
                 self.still[k] = self._slow(at, k)
         near = TOUCHING if start else TOGETHER * max(1.0, float(np.abs(x[:self.request.n_state]).max(initial=0.0)))
         for k, mode in enumerate(self.modes):
             v = at.slip[self.normal[k]]
-            if mode != OPEN or k in closing or self.passed[k] or not self.records[k].normal:
+            if mode != OPEN or k in closing or self.passed[k] or not self.records[k].normal or self._is_leaving(k, t, x, at):
                 continue
             if (abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0)) or (k in self.clutches and v < -TOUCHING):
                 closing.add(k)
@@ -844,6 +852,16 @@ class _Phases:
             self._choose(t, self._numbers(t, x), closed)
         self._pass_by(t, x, [self.passed[k] if k in turned else now for k, now in enumerate(self._ignored(t, x))])
         return x
+
+    def _is_leaving(self, k: int, t: float, x: np.ndarray, at: Numbers) -> bool:
+        """Whether a contact has just opened: its gap is rounding, which may pass zero, and no speed closes it."""
+        begin, end = self.request.span
+        since = self.left.get(k)
+        if since is None or t - since > LEAVES * (end - begin):
+            return False
+        speeds = x[self.module.metadata.sizes.q:self.request.n_state]
+        fastest = max(float(np.abs(at.slip).max()), float(np.abs(speeds).max(initial=0.0)))
+        return bool(at.slip[self.normal[k]] >= -NO_SPEED * fastest and abs(at.gap[k]) <= LOWEST_FLIGHT * self.size)
 
     def _ignored(self, t: float, x: np.ndarray) -> list[bool]:
         return ignored(self.module, t, x, self.request.p, self.request.inputs.at(t, x[:self.request.n_state]))
