@@ -125,7 +125,8 @@ def woodpecker_toy() -> System:
     sides = [[-0.0031, -0.0058, 0], [-0.0031, 0.0058, 0], [0.0031, 0.0058, 0], [0.0031, -0.0058, 0], [-0.0031, -0.0058, 0]]
     outline = [[0, -0.02, 0], [0.004, 0, 0], [0, 0.02, 0], [-0.0201, 0.02, 0], [0, 0.016, 0], [-0.004, 0, 0], [0, -0.02, 0]]
     arms = [[0.0031, 0, 0], [0.010, 0, 0]], [[-0.015, 0, 0], [-0.004, 0, 0]]  # which the spring joins
-    for carrier, body, lines, color in ((*parts[:2], (sides, arms[0]), "#7a4b8a"), (*parts[2:], (outline, arms[1]), "#4a6a8a")):
+    looks = ((parts[0], parts[1], (sides, arms[0]), "#7a4b8a"), (parts[2], parts[3], (outline, arms[1]), "#4a6a8a"))
+    for carrier, body, lines, color in looks:
         system.draw(carrier, shapes.Cylinder([0, 0, -0.001], [0, 0, 0.001], 0.0008, 0.0008), color=color)
         for points in lines:
             system.draw(body, shapes.Line(points, 2.0), color=color)
