@@ -625,8 +625,10 @@ __attribute__((noinline)) static int symdyn_event_widened(symdyn_run *run, const
     for (int l = 0; l < SYMDYN_LEAVES; l++) run->events.limited[l] = l;
     run->events.n_limited = SYMDYN_LEAVES;
     // Far away, at the first time, the second, the fourth, ...
-    if (inside && run->events.widened >= 8 && !(++run->events.n_widened & (run->events.n_widened - 1)))
-        symdyn_event_unlimited(run);
+    if (inside && run->events.widened >= 8) {
+        const long n = ++run->events.n_widened;
+        if (!(n & (n - 1))) symdyn_event_unlimited(run);
+    }
     return inside;
 }
 
