@@ -178,6 +178,27 @@ def test_static_friction_holds_more_than_kinetic_friction() -> None:
     np.testing.assert_allclose(still.q, 0, atol=1e-13)  # held from the first step on
 
 
+def test_a_box_that_is_pushed_on_two_corners_begins_to_slide_when_both_are_at_their_bound() -> None:
+    """How the corners share friction is open: one may be at its bound of static friction while the other still holds the box."""
+    m, static, kinetic, g, rate, end = 2.0, 0.5, 0.4, 9.81, 3.0, 6.0
+    system = sd.System("pushed", gravity=[0, -g])
+    body = system.add_body("box", mass=m, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_force(body, [rate * sd.t, 0])
+    system.add_contact(sd.Contact("corner", body, system.ground, shape=sd.contacts.Box([0.4, 0.2]), friction=(static, kinetic)))
+    start = static * m * g / rate
+    pushed = rate * (end**3 - start**3) / 6 - rate * start**2 * (end - start) / 2
+    reached = (pushed - kinetic * m * g * (end - start) ** 2 / 2) / m
+    run = system.compile().simulate((0, end), q={"y": 0.1}, method="moreau", step=1e-2)
+    assert abs(run["x"][-1] - reached) < 1e-4
+    assert [run.contacts[f"corner_{k}"].mode[-1] for k in (1, 3)] == ["sliding"] * 2
+    with pytest.raises(ArgumentError, match="pushed: there is no contact 'corner'; did you mean corner_"):
+        run.contacts["corner"]
+    held = run.t < start - 0.02
+    for k in (1, 3):
+        assert set(np.array(run.contacts[f"corner_{k}"].mode)[held][1:]) == {"sticking"}
+
+
 def test_constraints_go_along_in_the_step() -> None:
     """A pendulum of a constraint that strikes a wall."""
     x, y = sd.coordinates("x y")

@@ -239,13 +239,21 @@ static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c, double h) {
     }
 }
 
+// Whether a contact slips in the present solution. Where contacts are redundant, forces of one may be at the bound of static
+// friction while others hold all of them.
+static int symdyn_slips(const symdyn_moreau *s, const symdyn_cones *c, long i) {
+    double square = 0.0;
+    for (long r = c->first[i] + symdyn_cones_lead(c, i); r < c->first[i + 1]; r++) square += c->w[r] * c->w[r];
+    return c->state[i] == SYMDYN_SLIDING && sqrt(square) > s->tolerance;
+}
+
 // Solve for the impulses; contacts that stuck and slip now have kinetic friction.
 static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h) {
     for (int again = 1; again;) {
         symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
         again = 0;
         for (long i = 0; i < c->n; i++)
-            if (!s->broken[i] && c->state[i] == SYMDYN_SLIDING) {
+            if (!s->broken[i] && symdyn_slips(s, c, i)) {
                 s->broken[i] = again = 1;
                 c->friction[i] = symdyn_bound(s, i, 0, h);
             }
@@ -322,7 +330,7 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
         for (int k = 0; k < 3; k++) s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
         s->old_a[i] = s->a[i];
         s->old_b[i] = s->b[i];
-        s->old_state[i] = c->state[i];
+        s->old_state[i] = s->broken[i] || !c->state[i] || symdyn_slips(s, c, i) ? c->state[i] : SYMDYN_STICKING;
         if (s->b[i] >= 0 && s->old_from[s->a[i]] < 0) s->old_from[s->a[i]] = i;
     }
     s->n_old = s->n_found;
