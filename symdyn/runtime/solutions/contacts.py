@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from symdyn.backend.metadata import ContactRecord
 from symdyn.contact_kinds import CLUTCH, STOP
+from symdyn.errors import ArgumentError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
 from symdyn.runtime.integrating.moreau import GAPS, MODES, modes_of
 from symdyn.runtime.integrating.outcome import Impact, Phase, Stepped
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
@@ -56,12 +59,27 @@ class ContactMotion(NamedTuple):
     switches: tuple[tuple[float, str], ...]
 
 
+class ContactMotions(dict[str, ContactMotion]):
+    """Contacts of a motion by name. Another name raises ArgumentError with those that there are."""
+
+    def __init__(self, owner: str, motions: Mapping[str, ContactMotion]) -> None:
+        super().__init__(motions)
+        self.owner = owner
+
+    def __missing__(self, name: object) -> ContactMotion:
+        near = difflib.get_close_matches(str(name), self, 3)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(self) or 'none'}"
+        raise ArgumentError(f"{self.owner}: there is no contact {shown(name)}; {hint}")
+
+
 def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
                     impacts: Sequence[Impact], stepped: Stepped | None = None) -> Mapping[str, ContactMotion]:
     """Every contact of a motion by name, one for each place where a shape touches."""
     if stepped is not None:
-        return {**stepped_contacts(solution, stepped), **_compliant(solution)}
-    return {**_rigid(solution, phases, row_phases, impacts), **_compliant(solution)}
+        rigid: Mapping[str, ContactMotion] = stepped_contacts(solution, stepped)
+    else:
+        rigid = _rigid(solution, phases, row_phases, impacts)
+    return ContactMotions(solution.module.name, {**rigid, **_compliant(solution)})
 
 
 def _compliant(solution: Solution) -> dict[str, ContactMotion]:
