@@ -121,7 +121,7 @@ def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
 
 
 @contextlib.contextmanager
-def _executor(arguments: argparse.Namespace, module: Module, device: str) -> Iterator[Any]:
+def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu") -> Iterator[Any]:
     """What --jobs and --dask name: a cluster; threads where code is compiled, else processes, which do not wait
     for each other; one thread where a GPU computes."""
     if arguments.dask is not None:

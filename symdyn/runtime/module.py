@@ -1172,11 +1172,11 @@ class Module:
         """The loaded unit that has a function, or a right-hand side with its integrator."""
         return self._unit(what)
 
-    def has(self, what: str | RightSide) -> bool:
+    def _has(self, what: str | RightSide) -> bool:
         """Whether a unit is loaded already."""
         return (RightSide() if what == "rhs" else what) in self._units
 
-    def remembered(self, name: str, make: Callable[[], Any]) -> Any:
+    def _remembered(self, name: str, make: Callable[[], Any]) -> Any:
         """An object that this thread made under a name; it is made now if it was not."""
         kept = self._local.__dict__
         if name not in kept:

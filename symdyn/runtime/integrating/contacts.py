@@ -107,7 +107,7 @@ class _Evaluated:
 
 def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
     """What the laws of contact take at a state."""
-    known: _Evaluated = module.remembered("contact_numbers", lambda: _Evaluated(module))
+    known: _Evaluated = module._remembered("contact_numbers", lambda: _Evaluated(module))
     return _numbers_of(module.metadata, known(t, x[:module.metadata.sizes.x], p, inputs))
 
 
@@ -335,7 +335,7 @@ class _Phases:
     quick: Motion | None = None
 
     def __post_init__(self) -> None:
-        table: _Table = self.module.remembered("contact_table", lambda: _Table(self.module))
+        table: _Table = self.module._remembered("contact_table", lambda: _Table(self.module))
         self.records, self.rows, self.normal, self.tangents = table.records, table.rows, table.normal, table.tangents
         self.clutches, self.placed, self.frictions = table.clutches, table.placed, table.frictions
         self.place, self.events, self.of_event = table.place, table.events, table.of_event

@@ -106,7 +106,7 @@ def of(module: Module, request: Request, method: object) -> Motion | None:
             or (request.look is not None and request.look.any())):
         return None
     method = str(method)
-    motion: Motion | None = module.remembered(f"hybrid_{method}_{request.works}", lambda: _motion(module, method, request.works))
+    motion: Motion | None = module._remembered(f"hybrid_{method}_{request.works}", lambda: _motion(module, method, request.works))
     return motion
 
 
@@ -235,10 +235,10 @@ class Motion:
     def _attach(self) -> None:
         """Take the code of phases that was compiled by now: nothing is compiled for what may never come."""
         for name, field in zip(("open", "closed"), self.fields, strict=True):
-            if not getattr(self.record, name) and self.module.has(field):
+            if not getattr(self.record, name) and self.module._has(field):
                 unit: Any = self.module.unit(field)
                 setattr(self.record, name, self._phase_code(unit))
-        if not self.record.rate and self.module.has(RHS):
+        if not self.record.rate and self.module._has(RHS):
             self._frame("rate", RHS, self.memory.take(self.record, "rate_p", np.zeros(max(1, self.n_p))))
 
     def go(self, times: np.ndarray) -> Done:

@@ -171,7 +171,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
 
 def looked_for(module: Module, events: Any) -> np.ndarray:
     """Events that are looked for all along, (n_e,) of bool: those of rigid contacts are as their modes say."""
-    own: np.ndarray = module.remembered("own_events", lambda: of_contacts(module.metadata))
+    own: np.ndarray = module._remembered("own_events", lambda: of_contacts(module.metadata))
     return wanted(module, events) & ~own
 
 
