@@ -43,7 +43,7 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind != "rail"]
     seen = np.concatenate([end for points, wide in room or [(shapes[0][1], 0.0)] for end in (points - wide, points + wide)])
     low, high = seen.min(axis=0), seen.max(axis=0)
-    alone = len(room) == 1 < len(shapes)  # a block without a mechanism, which its rail tells apart from a box
+    alone = len(room) == 1 < len(shapes)  # a block without a mechanism: its rail distinguishes it from a box
     span = np.maximum((high - low) * (_AROUND if alone else 1.0), 1e-9)
     scale = min((_WIDE - 2 * _MARGIN) / span[0], (_HIGH - 2 * _MARGIN) / span[1])
     middle = (low + high) / 2

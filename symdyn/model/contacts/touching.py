@@ -121,7 +121,7 @@ class Touching(UserFunction):
         i = self.implicit
         at = dict(zip((*i.unknowns, *i.known), (*self.applied(arguments), *arguments), strict=True))
         found = _cramer([e.diff(s) for e in i.residual for s in i.unknowns], [-e.diff(i.known[k]) for e in i.residual])[place]
-        return sp.sympify(found).xreplace(at)
+        return found.xreplace(at)
 
     def _solved(self, numbers: Arithmetic, values: Sequence[Any], close: Any) -> Any:
         r, n = self.implicit.recorded, self.results

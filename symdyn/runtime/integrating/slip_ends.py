@@ -19,7 +19,7 @@ import numpy as np
 # from which on it is all of that.
 NOISE, LEAST, MOST = 100.0, 1e-8, 0.1
 # What rounding of speeds makes of the direction of a slip, by their size over the slip; what it makes of slips counts as so many
-# times that beside tolerances.
+# times that in addition to tolerances.
 ROUNDED, NOISY = 10 * np.finfo(float).eps, 1e4
 # The shortest last stretch by the time at which it ends.
 SHORTEST = 1e3 * np.finfo(float).eps

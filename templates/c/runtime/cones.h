@@ -11,6 +11,7 @@
 #pragma once
 
 #include "cones_type.h"
+#include "elimination.h"
 #include "prelude.h"
 
 // Relative velocities that changes of the speeds make along the rows of a contact.
@@ -158,37 +159,6 @@ static double symdyn_cones_residual(symdyn_cones *c) {
     return worst;
 }
 
-// Solve a dense system in place by elimination with row exchanges; the result replaces b. Returns 0 if it is singular.
-static int symdyn_cones_eliminate(double *A, double *b, long n) {
-    for (long k = 0; k < n; k++) {
-        long best = k;
-        for (long i = k + 1; i < n; i++)
-            if (fabs(A[i * n + k]) > fabs(A[best * n + k])) best = i;
-        if (!(fabs(A[best * n + k]) > 0.0)) return 0;
-        if (best != k) {
-            for (long j = k; j < n; j++) {
-                const double kept = A[k * n + j];
-                A[k * n + j] = A[best * n + j];
-                A[best * n + j] = kept;
-            }
-            const double kept = b[k];
-            b[k] = b[best];
-            b[best] = kept;
-        }
-        for (long i = k + 1; i < n; i++) {
-            const double part = A[i * n + k] / A[k * n + k];
-            if (part == 0.0) continue;
-            for (long j = k + 1; j < n; j++) A[i * n + j] -= part * A[k * n + j];
-            b[i] -= part * b[k];
-        }
-    }
-    for (long k = n - 1; k >= 0; k--) {
-        for (long j = k + 1; j < n; j++) b[k] -= A[k * n + j] * b[j];
-        b[k] /= A[k * n + k];
-    }
-    return 1;
-}
-
 // Rows of a slipping contact: P_t - mu P_n z/|z| = 0 along z/|z| and across it, in place of the rows of D.
 static void symdyn_cones_slip_rows(const symdyn_cones *c, long i, long row, long n, double *A, double *right) {
     const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
@@ -260,7 +230,7 @@ static int symdyn_cones_newton(symdyn_cones *c, double little) {
         if (m > lead && c->state[i] == 2) symdyn_cones_slip_rows(c, i, row, n, A, right);
         row += m;
     }
-    if (!symdyn_cones_eliminate(A, right, n)) return 0;
+    if (symdyn_solve_rows(n, n, A, right, 0.0)) return 0;
     row = 0;
     for (long i = 0; i < c->n; i++)
         for (long r = c->first[i]; r < c->first[i + 1] && c->state[i]; r++) c->P[r] += right[row++];

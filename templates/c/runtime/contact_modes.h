@@ -5,6 +5,7 @@
 // friction within Coulomb's cone.
 #pragma once
 
+#include "elimination.h"
 #include "modes.h"
 
 enum { SYMDYN_MOST_SITES = 4, SYMDYN_MOST_ROWS = 2 * SYMDYN_MOST_SITES };
@@ -31,43 +32,6 @@ typedef struct {
 
 // The row of friction of a site, -1: there is none.
 static int symdyn_rubs(const symdyn_site *site) { return site->bounded ? site->first : site->n > 1 ? site->first + 1 : -1; }
-
-static double symdyn_most(const double *v, int n) {
-    double most = 0.0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-    return most;
-}
-
-// x of A x = y, (n, n) in rows of `width`, by elimination with the largest pivots; both are overwritten, y by x. Returns 1 where
-// rows depend on each other.
-static int symdyn_solve_rows(int n, int width, double *A, double *y, double dependent) {
-    double most = 0.0;
-    for (int i = 0; i < n; i++) most = fmax(most, symdyn_most(A + i * width, n));
-    for (int k = 0; k < n; k++) {
-        int best = k;
-        for (int i = k + 1; i < n; i++)
-            if (fabs(A[i * width + k]) > fabs(A[best * width + k])) best = i;
-        if (!(fabs(A[best * width + k]) > dependent * most)) return 1;
-        for (int j = k; best != k && j < n; j++) {
-            const double kept = A[k * width + j];
-            A[k * width + j] = A[best * width + j];
-            A[best * width + j] = kept;
-        }
-        const double kept = y[k];
-        y[k] = y[best];
-        if (best != k) y[best] = kept;
-        for (int i = k + 1; i < n; i++) {
-            const double factor = A[i * width + k] / A[k * width + k];
-            for (int j = k + 1; j < n; j++) A[i * width + j] -= factor * A[k * width + j];
-            y[i] -= factor * y[k];
-        }
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int j = i + 1; j < n; j++) y[i] -= A[i * width + j] * y[j];
-        y[i] /= A[i * width + i];
-    }
-    return 0;
-}
 
 // The size of forces that count, by the largest force.
 static double symdyn_force_size(const symdyn_modes *m, const double *lam, double size) {
