@@ -94,26 +94,18 @@ def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
     solved for it."""
     if not equations.events:
         return []
-    return [_unknowns(equations, entry) for entry in equations.quantity("events")]
-
-
-def _unknowns(equations: Equations, entry: Any) -> tuple[list[str], list[str]]:
-    recorder, inputs, functions = equations.recorder, [], []
-    stack, seen = [entry], set()
-    while stack:
-        node = stack.pop()
-        if not isinstance(node, Node) or node in seen:
-            continue
-        seen.add(node)
+    recorder, values = equations.recorder, equations.quantity("events")
+    known: dict[Node, frozenset[str | UserFunction]] = {}
+    for node in reachable(values):
         if node.op == "leaf":
-            inputs += [node.args[1]] if node.mask & INPUT else []
-        elif node.op == "call" and isinstance(node.args[0], UserFunction):
-            functions.append(node.args[0].signature)
-        elif node.op not in ("call", "guard") and node not in recorder.checks:
-            stack += node.args
-        if node.op == "call" and isinstance(node.args[0], UserFunction):
-            stack += node.args[1:]
-    return sorted(inputs), sorted(set(functions))
+            known[node] = frozenset([node.args[1]] if node.mask & INPUT else [])
+            continue
+        own = [a for a in node.args[:1] if isinstance(a, UserFunction)]
+        solved = not own and (node.op in ("call", "guard") or node in recorder.checks)
+        known[node] = frozenset() if solved else frozenset(own).union(*{known[a] for a in node.args if isinstance(a, Node)})
+    found = [known.get(entry, frozenset()) for entry in values]
+    return [(sorted(one for one in names if isinstance(one, str)),
+             sorted({one.signature for one in names if not isinstance(one, str)})) for names in found]
 
 
 def _leaf_names(equations: Equations) -> list[str]:

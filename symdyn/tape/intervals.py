@@ -59,8 +59,18 @@ ZERO, ANY = Interval(0, 0), Interval(-BIG, BIG)
 def encloses(recorder: Recorder, entry: Any) -> bool:
     """Whether a value can be enclosed: it is short, and calls no algorithm, solves no equations and calls no function of the
     user."""
-    moving = [node for node in reachable([entry]) if node.mask & ~PARAMETER]
-    return len(moving) <= MOST and not any(node.op in ("call", "item", "guard") or node in recorder.checks for node in moving)
+    stack, seen = [entry], set[Node]()
+    while stack:
+        node = stack.pop()
+        if not isinstance(node, Node) or node in seen or not node.mask & ~PARAMETER:
+            continue
+        if node.op in ("call", "item", "guard") or node in recorder.checks:
+            return False
+        seen.add(node)
+        if len(seen) > MOST:
+            return False
+        stack += node.args
+    return True
 
 
 def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node, Jet], rounded: bool = False) -> list[Jet]:

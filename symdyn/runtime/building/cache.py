@@ -142,8 +142,9 @@ def _command(compiler: Compiler, source: Path, library: Path) -> list[str]:
     return [*compiler.command, "-o", str(library), str(source), *flags(compiler), *link_flags(compiler)]
 
 
+@functools.cache
 def _sweep(folder: Path) -> None:
-    """Remove what builds that were killed have left behind."""
+    """Remove what builds that were killed have left behind; once in a process, as a folder may hold many files."""
     limit = time.time() - STALE_SECONDS
     for left in [*folder.glob("build-*"), *folder.glob(".*.tmp")]:
         try:
