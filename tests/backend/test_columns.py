@@ -120,7 +120,7 @@ def test_bound_parameters() -> None:
 
 
 @pytest.mark.usefixtures("always")
-def test_long_functions_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_functions_in_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def short(folder: Path) -> Any:
         dialect = read_dialect(folder)
         return replace(dialect, parts=replace(dialect.parts, whole=100, longest=60)) if dialect.parts else dialect
@@ -129,6 +129,8 @@ def test_long_functions_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     equations = systems.get("spatial_chain", n=4).embedding()
     text = next(iter(emit(equations, "c", ["jacobian_x"], standalone=False, integrator=False).files.values()))
     assert "jacobian_x_values_part_3(" in text and "jacobian_x_along_q_3(" in text and "jacobian_x_along_u_2(" in text
+    (tmp_path / "made.c").write_text(text)
+    assert faults_of(tmp_path / "made.c", tidy=False) == ""
     assert difference(equations, both(equations, ["jacobian_x"]), "jacobian_x") < 1e-12
 
 
