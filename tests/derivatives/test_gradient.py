@@ -28,6 +28,7 @@ def module() -> Any:
     return sd.systems.n_link_pendulum(2).embedding().compile()
 
 
+@pytest.mark.native  # its bound is that of fused operations
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 def test_exact_for_the_steps_that_were_taken(method: str) -> None:
     """At steps of one length, long ones, the loss is a smooth function, whose differences the gradient is."""

@@ -18,6 +18,7 @@ from symdyn.errors import ArgumentError, EvaluationWarning, SimulationInterrupte
 from symdyn.runtime.batches.arguments import take_rows
 from tests.user_functions import BOUNDED
 
+pytestmark = pytest.mark.native  # tcc has no vectors
 N = 11  # more than two vectors of four lanes, and some left over
 
 

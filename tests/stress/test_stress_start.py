@@ -50,6 +50,7 @@ def crane(**initial: float) -> sd.System:
 
 
 @needs_c
+@pytest.mark.native
 def test_code_that_does_not_compile_is_told_once_with_what_the_compiler_says() -> None:
     text = "static int gust(const double *in, double *out) { out[0] = in[0] +; return 0; }"
     report = sd.stress(cart(lambda x: sd.External("gust", ["v"], c=text, python=gust)(x.dot)), short=True)

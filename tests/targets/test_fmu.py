@@ -13,7 +13,7 @@ from symdyn.lab.fmus import WAYS, compared, validated
 from symdyn.runtime.building.compiler import find_compiler
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.skipif(find_compiler() is None, reason="no C compiler"), pytest.mark.native]
 
 
 def _ball(stop: bool = False) -> sd.System:

@@ -19,6 +19,7 @@ jax = pytest.importorskip("jax")
 jnp = pytest.importorskip("jax.numpy")
 PAGE = Path(__file__).parent.parent.parent / "docs" / "other_libraries.md"
 THROUGH = ["xla", *["c"] * (find_compiler() is not None)]
+pytestmark = pytest.mark.native  # the library for XLA has headers
 
 
 @pytest.fixture(autouse=True)
