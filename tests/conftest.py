@@ -9,6 +9,7 @@ import shlex
 import shutil
 import signal
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -33,8 +34,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "slow: takes more than ten seconds")
-    config.addinivalue_line("markers", "native: has C compiled by gcc or clang, where others have tcc")
     gc.set_threshold(*GC_THRESHOLD)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell: tests that press Ctrl-C would wait
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -52,6 +51,7 @@ def pytest_unconfigure() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest first, so that no worker is left with one of them at the end; the lecture before its notebooks."""
     def place(item: pytest.Item) -> int:
@@ -59,13 +59,32 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             return 0
         return 1 if item.path.parent.name == "lecture" else 2 if item.path.suffix == ".ipynb" else 3
 
+    leave_to_the_sweep(items)
     items.sort(key=place)
+
+
+def leave_to_the_sweep(items: list[pytest.Item]) -> None:
+    """Mark for the sweep what of a test marked `every_value` adds a combination only: what is left has every value of each of
+    its parameters, in combinations with what was least used so far."""
+    groups: dict[str, list[pytest.Function]] = {}
+    for item in items:
+        if isinstance(item, pytest.Function) and hasattr(item, "callspec") and item.get_closest_marker("every_value"):
+            groups.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for group in groups.values():
+        values = {item: {(name, id(value)) for name, value in item.callspec.params.items()} for item in group}
+        missing, used = set[tuple[str, int]]().union(*values.values()), Counter[tuple[str, int]]()
+        while missing:
+            chosen = min(values, key=lambda item: (-len(missing & values[item]), sum(used[one] for one in values[item])))
+            missing -= values[chosen]
+            used.update(values.pop(chosen))
+        for item in values:
+            item.add_marker(pytest.mark.sweep)
 
 
 def compile_quickly() -> None:
     """Have C compiled by tcc, in a thirtieth of the time of gcc, or with -O0.
 
-    Tests of generated C and those that are marked `native` have gcc or clang with -O0 in any case.
+    Tests of generated C, of peers' C and those that are marked `native` have gcc or clang with -O0 in any case.
     """
     from symdyn.runtime.building.compiler import LINUX, find_compiler, package_path
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import random
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
@@ -26,6 +26,14 @@ TOLERANCE = mpmath.mpf(10) ** -25
 HIGH = 80
 STEP = mpmath.mpf(10) ** -20
 GRAVITY = 9.81
+
+
+def swept(cases: Iterable[Any], *few: Any) -> list[Any]:
+    """Cases of a parametrized test, of which all but a few are left to `pytest -m sweep`."""
+    listed = list(cases)
+    assert all(one in listed for one in few), f"{few} are not all among {listed}"
+    return [one if one in few else pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.sweep)
+            for one in listed]
 
 
 def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:

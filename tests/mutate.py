@@ -44,8 +44,8 @@ QUICK = 5.0         # no more seconds of them
 FILE_SECONDS = 300  # processor time of one file of tests while functions are noted
 SLACK = 4.0         # times the noted seconds, and
 SPARE = 60.0        # seconds more, of processor time, before a mutant counts as one that never ends
-PYTEST = ("-m", "pytest", "-q", "-x", "-o", "addopts=", "-p", "tests.mutation.plugin", "-p", "no:cacheprovider", "-p",
-          "no:nbmake")
+PYTEST = ("-m", "pytest", "-q", "-x", "-m", "not sweep", "-o", "addopts=", "-p", "tests.mutation.plugin", "-p",
+          "no:cacheprovider", "-p", "no:nbmake")
 
 
 @dataclass(frozen=True)

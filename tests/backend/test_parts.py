@@ -48,6 +48,7 @@ def test_a_long_result_is_stored_by_several_parts(divided: Any) -> None:
     assert [part.stores for part in function.parts] == [bool(part) for part in stored]
 
 
+@pytest.mark.every_value
 @needs_c
 @pytest.mark.parametrize("longest", [20, 100])
 @pytest.mark.parametrize(("name", "options"), [("spatial_chain", {"n": 4}), ("puma560", {}), ("n_link_pendulum", {"n": 6})])

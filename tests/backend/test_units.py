@@ -47,6 +47,7 @@ def test_units_of_a_text() -> None:
     assert translation_units("one\n") == [TranslationUnit("one\n")]
 
 
+@pytest.mark.every_value
 @needs_c
 @pytest.mark.parametrize("method", ["dop853", "bs54", "radau5", "gauss"])
 @pytest.mark.parametrize("system", ["pendulum", "four_bar", "ball", "double_wishbone"])

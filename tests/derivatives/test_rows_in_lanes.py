@@ -22,6 +22,7 @@ def states(module: Any, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return start + 0.05 * rng.normal(size=(n, len(start))), *rng.normal(size=(2, n, len(start)))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("name", "form"), [("puma560", "embedding"), ("four_bar", "augmented")])
 @pytest.mark.parametrize("n", [3, 8, 203])  # fewer than lanes, as many, and some left over
 def test_bits_of_each_state(name: str, form: str, n: int) -> None:

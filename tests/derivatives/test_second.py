@@ -34,6 +34,7 @@ def point(module: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return x, rng.normal(size=sizes.inputs), rng.normal(size=sizes.x), rng.normal(size=sizes.x + sizes.inputs + sizes.p)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("name", "formulation"), CASES)
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_gradients_are_weighted_rows_of_the_jacobian(name: str, formulation: str, backend: str) -> None:

@@ -179,6 +179,7 @@ def ladder_by_hand(angle, spin, friction):
     return found
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ("numpy", "c"))
 @pytest.mark.parametrize("seed", range(8))
 def test_two_frictions_at_once(seed, backend):

@@ -77,6 +77,7 @@ def found(system: sd.System, **options: Any) -> list[str]:
 # -- what is found
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("sequence", SEQUENCES)
 @pytest.mark.parametrize("kind", [sd.Spherical, sd.Free])
 def test_the_first_of_three_angles_may_lock(sequence: str, kind: type) -> None:
@@ -249,6 +250,7 @@ CASES: dict[str, tuple[Callable[[], sd.System], int, tuple[float, ...], str]] = 
     "longer": (lambda: stretched((1.0, 0.4)), 1, (0.0, np.pi, -np.pi), "at this position it moves nothing that b_dot does not")}
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("case", CASES)

@@ -37,6 +37,7 @@ def same(a: Any, b: Any) -> bool:
     return helpers.close(a, b, 1e-22)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_trees(seed: int, form: tuple[str, str]) -> None:
@@ -46,6 +47,7 @@ def test_random_trees(seed: int, form: tuple[str, str]) -> None:
         assert same(a, b), name
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", [*SEEDS][:6])
 def test_jacobians_and_power(seed: int, form: tuple[str, str]) -> None:

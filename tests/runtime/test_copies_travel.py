@@ -32,6 +32,7 @@ def bouncing() -> sd.System:
 WAYS: list[Callable[[object], object]] = [lambda thing: pickle.loads(pickle.dumps(thing)), copy.deepcopy]
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", ["ball", "four_bar", "land_wind_turbine", "rolling_disc"])
 def test_a_system_is_copied_with_all_that_is_in_it(way: Callable[[sd.System], sd.System], name: str) -> None:

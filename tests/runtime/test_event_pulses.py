@@ -78,6 +78,7 @@ def pulse(t: float, x: np.ndarray) -> float:
     return float(np.exp(-((t - 33.3) / 0.02) ** 2))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("given", [{"F": pulse}, pulse])
 def test_a_pulse_of_an_input_function_is_warned_of_or_found_with_a_spacing(backend: str, given: Any) -> None:

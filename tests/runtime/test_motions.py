@@ -68,6 +68,7 @@ def test_accelerations_are_those_of_the_same_motion_in_t(kind: str, form: str) -
         np.testing.assert_allclose(first.rhs(t, x, inputs=as_inputs(t)), second.rhs(t, x), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("make", [lambda motion: hung(motion, "Revolute"), moved_ground])
 @pytest.mark.parametrize("absolute", [False, True])
 def test_verify_holds(make, absolute: bool) -> None:

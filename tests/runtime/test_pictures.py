@@ -21,6 +21,7 @@ from symdyn import systems
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
+from tests.helpers import swept
 
 pytest.importorskip("matplotlib")
 image = pytest.importorskip("PIL.Image")
@@ -384,10 +385,9 @@ def missed(points: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name, coordinates, options", [
-    ("four_bar", "relative", {}), ("four_bar", "absolute", {}), ("n_four_bar", "relative", {"n": 3}),
-    ("andrews_squeezer", "relative", {}), ("bricard", "relative", {}), ("spatial_slider_crank", "relative", {}),
-    ("spatial_slider_crank", "absolute", {}), ("double_wishbone", "relative", {}),
-    ("flyball_governor", "relative", {"links": "rods"})])
+    ("four_bar", "relative", {}), ("four_bar", "absolute", {}), ("bricard", "relative", {}), ("double_wishbone", "relative", {}),
+    *swept([("n_four_bar", "relative", {"n": 3}), ("andrews_squeezer", "relative", {}), ("spatial_slider_crank", "relative", {}),
+            ("spatial_slider_crank", "absolute", {}), ("flyball_governor", "relative", {"links": "rods"})])])
 def test_bodies_meet_at_every_joint_of_their_loops(name: str, coordinates: str, options: dict[str, Any]) -> None:
     solution = loop(name, coordinates, (0.0, 0.01 if name == "andrews_squeezer" else 0.1), **options)
     drawing, metadata = Drawing.of(solution), solution.module.metadata

@@ -65,6 +65,7 @@ def expected(static: float, kinetic: float) -> tuple[float, float, np.ndarray]:
     return begins, float(found.t[-1]), found.y[:2, -1]
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("rtol", [1e-6, 1e-11])
 @pytest.mark.parametrize("kinetic", [0.4, 0.3])
 def test_a_skid_slips_along_the_force_that_held_it_last(kinetic: float, rtol: float) -> None:

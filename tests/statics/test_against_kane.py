@@ -78,7 +78,7 @@ def nonminimal() -> tuple[Any, Peer]:
                           kd_eqs=[a.diff(T) - b for a, b in zip(p, v, strict=True)], configuration_constraints=[rod - length],
                           velocity_constraints=[(p[0] * v[0] + p[1] * v[1]) / rod])
     kane.kanes_equations([me.Particle("bob", P, mass)], [(P, mass * sp.Rational(98, 10) * N.x)])
-    return s.augmented().compile(backend="numpy"), Peer(kane)
+    return s.augmented().compile(), Peer(kane)
 
 
 @pytest.mark.parametrize(("angle", "rate"), [(0.0, 0.0), (0.4, 0.0), (0.4, 1.7), (-1.1, -0.6), (2.5, 3.0)])
@@ -138,7 +138,7 @@ def disc() -> tuple[Any, Peer]:
                           velocity_constraints=sp.Matrix([me.dot(P.vel(N), e) for e in FC]))
     inertia = me.inertia(FC, mass * radius**2 / 4, mass * radius**2 / 2, mass * radius**2 / 4)
     kane.kanes_equations([me.RigidBody("disc", CO, FC, mass, (inertia, CO))], [(CO, mass * weight * FA.z)])
-    return s.augmented().compile(backend="numpy"), Peer(kane)
+    return s.augmented().compile(), Peer(kane)
 
 
 def turned(axis: int, angle: float) -> np.ndarray:
@@ -222,7 +222,7 @@ def cart(n: int) -> tuple[Any, Peer]:
         s.add_torque(link, torques[k], reaction=parent if k else None)
         parent = link
     s.defaults = {**dict(zip(m, (2.0, 0.7, 0.4, 0.3), strict=False)), **dict(zip(l, (0.6, 0.5, 0.35), strict=False)), g: 9.81}
-    return s.embedding().compile(backend="numpy"), Peer(models.n_link_pendulum_on_cart(n, True, True))
+    return s.embedding().compile(), Peer(models.n_link_pendulum_on_cart(n, True, True))
 
 
 @pytest.mark.parametrize("moving", [0, 1])
@@ -269,7 +269,7 @@ def masses() -> tuple[Any, Peer]:
         parent = body
     s.defaults = {**dict(zip(m, (1.0, 2.0, 0.5), strict=True)), **dict(zip(k, (90.0, 40.0, 70.0), strict=True)),
                   **dict(zip(c, (0.4, 0.0, 1.3), strict=True)), g: 9.81}
-    return s.embedding().compile(backend="numpy"), Peer(models.multi_mass_spring_damper(3, True, True))
+    return s.embedding().compile(), Peer(models.multi_mass_spring_damper(3, True, True))
 
 
 def test_masses_in_a_row() -> None:
@@ -331,7 +331,7 @@ def four_bar() -> tuple[Any, Peer]:
     kane = me.KanesMethod(N, q_ind=[p[0]], u_ind=[u[0]], q_dependent=p[1:], u_dependent=u[1:], kd_eqs=rates,
                           configuration_constraints=closed, velocity_constraints=[e.diff(T).subs(by_speeds) for e in closed])
     kane.kanes_equations(bodies, [(bodies[0].frame, drive * N.z)])
-    return s.augmented().compile(backend="numpy"), Peer(kane)
+    return s.augmented().compile(), Peer(kane)
 
 
 @pytest.mark.parametrize("factor", [0.0, 1.0, -25.0])

@@ -93,6 +93,7 @@ def assert_alike(found: np.ndarray, expected: np.ndarray, bound: float) -> None:
         assert abs(left.pop(k) - value) <= bound * max(1.0, abs(value))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("W", [1.5, 6.0, 14.0])
 @pytest.mark.parametrize("n", [2, 3])
 def test_multipliers_over_a_turn_are_those_of_lagranges_equations(n: int, W: float) -> None:

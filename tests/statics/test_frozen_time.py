@@ -18,6 +18,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, NoEquilibrium
+from tests.helpers import swept
 
 # -- what the tests share
 
@@ -68,7 +69,7 @@ def free_rotor(attitude: str) -> Any:
         at = [0, 0, 0]
         at[along] = place
         s.add_spring_damper(s.ground, body, point_a=at, point_b=at, stiffness=stiffness)
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 SPEED = {"parameters": "omega_z_free", "angles": "omega_z_free", "rates": "phi_dot", "first": "psi_dot"}
@@ -92,6 +93,7 @@ def test_the_closed_form_of_the_rotor_gives_the_known_frequencies() -> None:
     assert np.allclose(np.sort(np.abs(isotropic(60.0))) / (2 * np.pi), [2.003, 4.023, 4.058, 4.123, 17.382], atol=5e-4)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("W", [60.0, -60.0, 7.0])
 @pytest.mark.parametrize("attitude", ["parameters", "angles", "rates", "first"])
 def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude: str, W: float) -> None:
@@ -177,7 +179,7 @@ def damped_rotor(attitude: str) -> Any:
         s.add_force(body, [-k_x[i] * r[0] - c[i] * v[0], -k_y[i] * r[1] - c[i] * v[1], -4000 * z - 40 * z.dot],
                     point=[0, 0, place])
         s.defaults |= {k_x[i]: DAMPED["k_x"][i], k_y[i]: DAMPED["k_y"][i], c[i]: DAMPED["c"][i]}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def anisotropic(W: float, damped: bool = True) -> np.ndarray:
@@ -197,6 +199,7 @@ def anisotropic(W: float, damped: bool = True) -> np.ndarray:
     return np.array([*second_order(M, C, K), *axial])
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("W", [25.0, 60.0, -60.0])
 @pytest.mark.parametrize("attitude", ["parameters", "angles"])
 def test_a_damped_rotor_on_unlike_bearings_decays(attitude: str, W: float) -> None:
@@ -220,7 +223,7 @@ def turned_place() -> Any:
     s.add_joint(sd.Prismatic("second", mid, mass, b, axis=[0, 1]))
     s.add_force(mass, [-k_x * (a * sp.cos(phi) - b * sp.sin(phi)), -k_y * (a * sp.sin(phi) + b * sp.cos(phi))])
     s.defaults = {m: 2.0, k_x: 50.0, k_y: 338.0}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 @pytest.mark.parametrize("W", [4.0, 9.0, 30.0, -9.0])
@@ -262,7 +265,7 @@ def shaft(axes: str, turning: str) -> Any:
         along, across = -100 * (c * a + n * b), -144 * (c * b - n * a)
         s.add_force(disc, [c * along - n * across, n * along + c * across])
     s.defaults = {W: 11.0} if turning == "prescribed" else {}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def asked(module: Any, W: float) -> Any:
@@ -282,6 +285,7 @@ def unround(W: float) -> np.ndarray:
 SHAFTS = [("fixed", "held"), ("fixed", "prescribed"), ("turning", "held"), ("turning", "prescribed")]
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("axes", "turning"), SHAFTS)
 @pytest.mark.parametrize("W", [3.0, 9.5, 10.5, 11.0, 11.9, 12.5, 40.0])
 def test_a_shaft_that_is_not_round_is_unstable_between_its_two_critical_speeds(axes: str, turning: str, W: float) -> None:
@@ -349,7 +353,7 @@ def shaken() -> Any:
     hinge = s.add_joint(sd.Revolute("hinge", s.ground, bob, theta))
     s.add_joint_force(hinge, -d * theta.dot)
     s.defaults = {g: 9.81, H: 0.1, d: 0.0}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def mathieu(a: float, q: float, d: float = 0.0) -> Any:
@@ -361,8 +365,9 @@ def mathieu(a: float, q: float, d: float = 0.0) -> Any:
 EDGES = [(mathieu_a, 0, 1), (mathieu_b, 1, -1), (mathieu_a, 1, 1), (mathieu_b, 2, -1), (mathieu_a, 2, 1), (mathieu_b, 3, -1)]
 
 
-@pytest.mark.parametrize(("edge", "order", "bounded", "q"), [
-    (*edge, q) for edge in EDGES for q in (0.3, 1.0, 2.5) if edge[1] < 3 or q > 1])
+@pytest.mark.parametrize(("edge", "order", "bounded", "q"), swept(
+    [(*edge, q) for edge in EDGES for q in (0.3, 1.0, 2.5) if edge[1] < 3 or q > 1],
+    *[(*edge, q) for edge, q in zip(EDGES, (1.0, 2.5, 0.3, 1.0, 2.5, 2.5), strict=True)]))
 def test_the_edges_of_mathieus_chart_to_a_millionth(edge: Any, order: int, bounded: int, q: float) -> None:
     """Characteristic values a_n(q), b_n(q); the upright pendulum, a < 0, is held up between a_0 and b_1. Source: DLMF 28.2."""
     a = float(edge(order, q))
@@ -425,7 +430,7 @@ def helicopter(n: int) -> Any:
                                         parent_rotation=[[c, -z, 0], [z, c, 0], [0, 0, 1]]))
         s.add_joint_force(hinge, -k_b * q)
     s.defaults = {M: HUB["M"], J: HUB["J"], m: HUB["m"], e: HUB["e"], r: HUB["r"], k_h: HUB["k_h"], k_b: HUB["k_b"], d: 0, g: 0}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def coleman(n: int, W: float) -> tuple[np.ndarray, np.ndarray]:
@@ -451,6 +456,7 @@ def coleman(n: int, W: float) -> tuple[np.ndarray, np.ndarray]:
 RESONANT, QUIET = (11.5, 13.0), (2.0, 7.0, 9.5)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("W", [*RESONANT, *QUIET, -13.0, -7.0])
 @pytest.mark.parametrize("n", [3, 4])
 def test_ground_resonance_without_naming_the_blades(n: int, W: float) -> None:
@@ -506,7 +512,7 @@ def flexible_shaft() -> Any:
     s.add_joint_force(s.add_joint(sd.Prismatic("first", wheel, mid, a, axis=[1, 0])), -k * a - d * a.dot)
     s.add_joint_force(s.add_joint(sd.Prismatic("second", mid, disc, b, axis=[0, 1])), -k * b - d * b.dot)
     s.defaults = {k: 200.0, d: 0.0, g: 9.81}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def sagging(W: float, d: float) -> complex:
@@ -520,7 +526,8 @@ def whirling(W: float, d: float) -> np.ndarray:
     return np.array([*roots, *roots.conj()])
 
 
-@pytest.mark.parametrize(("W", "d"), [(4.0, 0.0), (4.0, 3.0), (9.9, 3.0), (10.1, 3.0), (25.0, 3.0), (-25.0, 3.0), (-6.0, 3.0)])
+@pytest.mark.parametrize(("W", "d"), [
+    (4.0, 0.0), (4.0, 3.0), (10.1, 3.0), (-25.0, 3.0), *swept([(9.9, 3.0), (25.0, 3.0), (-6.0, 3.0)])])
 def test_weight_in_the_plane_of_a_rotor_makes_a_periodic_motion(W: float, d: float) -> None:
     """There is no equilibrium in turning axes, and the message names the call; the motion there goes round once a turn."""
     module = flexible_shaft()
@@ -562,7 +569,7 @@ def test_a_blade_that_swings_under_its_weight_comes_back_after_a_turn(W: float) 
     wheel, blade = s.add_body("wheel", inertia=1), s.add_body("blade", mass=1.5, com=[1.2, 0])
     s.add_joint(sd.Revolute("spin", s.ground, wheel, W * sd.t))
     s.add_joint_force(s.add_joint(sd.Revolute("lag", wheel, blade, b, parent_point=[0.3, 0])), -90 * b - 2 * b.dot)
-    module = s.embedding().compile(backend="numpy")
+    module = s.embedding().compile()
     found = module.stability(period=2 * math.pi / W)
     t, x = found.motion
     assert found.kind == "periodic motion" and np.ptp(x[:, 0]) > 1e-2

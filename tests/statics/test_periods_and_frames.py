@@ -24,7 +24,7 @@ def parametric() -> Any:
     s.add_joint(sd.Prismatic("rail", s.ground, s.add_body("mass", mass=1), q, axis=[1, 0]))
     s.add_joint_force("rail", -(1 + eps * sp.sin(w * sd.t)) * q - c * q.dot)
     s.defaults = {eps: 0.02, w: 2.0, c: 1e-4}
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def test_half_a_period_is_no_period() -> None:
@@ -42,7 +42,7 @@ def test_a_period_of_forces_that_is_not_theirs() -> None:
     s = sd.System("driven", planar=True)
     s.add_joint(sd.Prismatic("rail", s.ground, s.add_body("mass", mass=1), q, axis=[1, 0]))
     s.add_joint_force("rail", sp.cos(2 * sd.t) - 10 * q - q**3 / 10 - 0.3 * q.dot)
-    module = s.embedding().compile(backend="numpy")
+    module = s.embedding().compile()
     assert module.stability(period=math.pi).verdict == "stable"
     with pytest.raises(ArgumentError, match="do not repeat after 3 s"):
         module.stability(period=3.0)
@@ -72,7 +72,7 @@ def spinning_body(three: bool) -> Any:
     else:
         joint = s.add_joint(sd.Spherical("ball", s.ground, body, orientation=sd.EulerAngles("ZYX"), coordinates=[a, b, c]))
         s.add_joint_force(joint, [-20 * a, -20 * b, 0])
-    return s.embedding().compile(backend="numpy")
+    return s.embedding().compile()
 
 
 def test_the_fixed_frame_sees_the_same_whatever_the_joints_are() -> None:
@@ -93,7 +93,7 @@ def test_a_guess_of_a_rest_is_taken_to_it() -> None:
     theta = sd.coordinates("theta")
     s = sd.System("pendulum", gravity=[0, -9.81])
     s.add_joint(sd.Revolute("hinge", s.ground, s.add_body("rod", mass=1, com=[0, -1]), theta))
-    module = s.embedding().compile(backend="numpy")
+    module = s.embedding().compile()
     assert [module.stability(start={"theta": at}).verdict for at in (3.0, 0.2)] == ["unstable", "neutral"]
     held = module.stability(fixed={"theta_dot": 1.0})
     assert held.verdict == "" and "nothing is free to move" in repr(held)
@@ -101,6 +101,6 @@ def test_a_guess_of_a_rest_is_taken_to_it() -> None:
 
 
 def test_a_table_of_a_singular_configuration_names_it() -> None:
-    module = sd.systems.n_four_bar(1).augmented().compile(backend="numpy")
+    module = sd.systems.n_four_bar(1).augmented().compile()
     flat = {"theta0": math.pi / 2, "theta1": math.pi / 2, "phi1": -math.pi / 2, "theta0_dot": 0, "theta1_dot": 0, "phi1_dot": 0}
     assert "singular configuration" in module.linearize(flat, params={"g": 0.0}).describe()

@@ -21,7 +21,7 @@ WEAVE, CAPSIZE = 4.29238253634111, 6.02426201538837
 
 @functools.cache
 def sleigh() -> Any:
-    return systems.sleigh().augmented().compile(backend="numpy")
+    return systems.sleigh().augmented().compile()
 
 
 def sliding(v: float) -> dict[str, float]:
@@ -37,7 +37,7 @@ def sleigh_polynomial(v: float = 1.0) -> list[float]:
 
 @functools.cache
 def disc() -> Any:
-    return systems.rolling_disc().augmented().compile(backend="numpy")
+    return systems.rolling_disc().augmented().compile()
 
 
 DISC = {"g": 1.0, "m": 1.0, "R": 1.0, "I_t": 0.25, "I_a": 0.5}
@@ -67,7 +67,7 @@ def wheelset() -> Any:
     s.add_constraint(forward - b * psi.dot - (r + gamma * y) * phi.dot, name="no creep of the left wheel")
     s.add_constraint(forward + b * psi.dot - (r - gamma * y) * phi.dot, name="no creep of the right wheel")
     s.defaults = {m: 1500.0, I_z: 800.0, I_y: 90.0, gamma: 0.05, r: 0.46, b: 0.75}
-    return s.augmented().compile(backend="numpy")
+    return s.augmented().compile()
 
 
 # -- the benchmark bicycle

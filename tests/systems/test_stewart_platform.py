@@ -158,6 +158,7 @@ def reference() -> Reference:
     return Reference()
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=pytest.mark.skipif(find_compiler() is None,
                                                                                           reason="no C compiler here"))])
 @pytest.mark.parametrize("t", TIMES)

@@ -124,6 +124,7 @@ def test_a_wrong_size_does_not_compile(package, tmp_path):
     _run("c++", "-std=c++17", "-fsyntax-only", "-I", package / "include", right)
 
 
+@pytest.mark.every_value
 @needs_arm
 @pytest.mark.parametrize("real", ["float", "double"])
 @pytest.mark.parametrize("name", ["two_link_arm", "four_bar"])

@@ -24,7 +24,7 @@ WORDS = ("fortran", "julia", "matlab", "rust")
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("name", ["strange", "two_link_arm", "bricard"])
+@pytest.mark.parametrize("name", ["strange", "two_link_arm", pytest.param("bricard", marks=pytest.mark.sweep)])
 def test_all_functions_give_their_reference_vectors(name: str, language: str, tmp_path: Path) -> None:
     system = strange() if name == "strange" else sd.systems.get(name)
     equations = system.augmented() if system.loops else system.embedding()
