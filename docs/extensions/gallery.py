@@ -1,6 +1,7 @@
 """The gallery: a page for each mechanism of the catalogue, and a grid of their pictures.
 
-Pages are made before the site is read, and kept until the package or the text that makes them changes.
+Pages are made before the site is read, and kept until the package or the text that makes them changes. SYMDYN_GALLERY, names of
+mechanisms, makes a site with these alone.
 """
 
 from __future__ import annotations
@@ -26,16 +27,22 @@ PAGES, VIEWS = ROOT / "docs" / "gallery", ROOT / "generated" / "gallery"
 AT_ONCE = min(os.cpu_count() or 1, 4)
 
 
+def shown() -> list[str]:
+    """Names of the mechanisms that have pages."""
+    wanted = os.environ.get("SYMDYN_GALLERY", "").split()
+    return [name for name in sd.systems.names() if not wanted or name in wanted]
+
+
 def fingerprint() -> str:
     """Of all that the pages are made from."""
     files = [Path(__file__).with_name("mechanisms.py"), *sorted((ROOT / "symdyn").rglob("*.py")),
              *sorted(file for file in (ROOT / "templates").rglob("*") if file.is_file())]
-    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
+    return hashlib.sha256(b"\0".join([*map(str.encode, shown()), *(file.read_bytes() for file in files)])).hexdigest()
 
 
 def make(app: Sphinx, config: object = None) -> None:
     """Make the pages of all mechanisms, several at once; none where all are kept."""
-    kept, now, names = PAGES / "made_from", fingerprint(), sd.systems.names()
+    kept, now, names = PAGES / "made_from", fingerprint(), shown()
     if kept.exists() and kept.read_text(encoding="utf-8") == now:
         return
     for folder in (PAGES, VIEWS):
@@ -58,10 +65,11 @@ class Gallery(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         trees, constrained = sd.systems.names(False), sd.systems.names(True)
-        others = [name for name in sd.systems.names() if name not in (*trees, *constrained)]
+        others = [name for name in shown() if name not in (*trees, *constrained)]
         touching = [name for name in others if sd.systems.get(name).contacts]
-        groups = {"trees": trees, "constrained": constrained, "touching": touching,
-                  "floating": [name for name in others if name not in touching]}
+        groups = {"trees": [name for name in trees if name in shown()],
+                  "constrained": [name for name in constrained if name in shown()],
+                  "touching": touching, "floating": [name for name in others if name not in touching]}
         cards = "".join(
             f'<a href="gallery/{name}.html"><img src="_static/{name}.svg" alt="{name}" width="260" height="200" loading="lazy">'
             f"<b>{name}</b><span>{escape(summary(name))}</span></a>" for name in groups[self.arguments[0]])
