@@ -386,6 +386,7 @@ def test_events_end_motions_one_by_one() -> None:
 
 def test_the_report_tells_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
     fast.rhs_batch(0.0, np.zeros((1, 4)))
+    assert four_bar.batch_width > 1  # compiles it
     for module, told in ((fast, f"rhs_batch {fast.batch_width} on the processor's vectors, simulate_batch likewise"),
                          (four_bar, "on the processor's vectors, simulate_batch likewise"),
                          (compiled("double_pendulum", "numpy"), "rhs_batch by broadcasting, simulate_batch one by one: the ba")):
