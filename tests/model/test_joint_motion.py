@@ -49,6 +49,7 @@ JOINTS: dict[str, Callable[[], Joint]] = {
 }
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", JOINTS)
 def test_motion_is_the_derivative_of_the_transform(name: str, seed: int) -> None:

@@ -123,6 +123,7 @@ def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("seed", [1, 2])
 def test_velocities_are_derivatives_of_positions(name: str, seed: int) -> None:
     equations = mechanism(name)

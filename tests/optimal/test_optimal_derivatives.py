@@ -111,6 +111,7 @@ def _derivatives_agree(program: Program, z: np.ndarray) -> None:
     assert np.abs(whole @ direction - found).max() < 1e-8 * (1 + np.abs(found).max())
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(radau, degree=3), functools.partial(shooting, hold=False),
                                   functools.partial(shooting, hold=True)], ids=["hermite-simpson", "radau", "shooting", "held"])
 @pytest.mark.parametrize("loops", [False, True])

@@ -229,6 +229,7 @@ def bump(narrow: float, place: float) -> tuple[sp.Expr, float]:
     return cost, float(np.trapezoid(y[2] ** 2 + g(y[0]), s))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("transcription", ["hermite-simpson", "radau", "shooting"])
 @pytest.mark.parametrize(("narrow", "place"), [(2000, 0.43), (1e5, 0.437)])
 def test_narrow_costs_are_integrated(transcription: str, narrow: float, place: float) -> None:

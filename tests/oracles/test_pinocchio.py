@@ -94,6 +94,7 @@ def test_dynamics_of_the_catalogue(name: str, formulation: str) -> None:
 
 
 # Every tree in one formulation, every second one in both.
+@pytest.mark.every_value
 @pytest.mark.parametrize(("seed", "formulation"), [(seed, f) for seed in range(TREES) for k, f in enumerate(FORMULATIONS)
                                                    if seed % 2 == 0 or seed // 2 % 2 == k])
 def test_dynamics_of_random_trees(seed: int, formulation: str) -> None:

@@ -52,6 +52,7 @@ def compiled() -> Any:
     return of
 
 
+@pytest.mark.every_value
 @pytest.mark.filterwarnings("error::symdyn.errors.SimulationWarning")
 @pytest.mark.parametrize(("backend", "method"), METHODS)
 @pytest.mark.parametrize("name", PULSES)

@@ -50,6 +50,7 @@ def momenta(tree: Tree) -> np.ndarray:
     return np.concatenate([found.h_0, found.h_G, found.center])
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("seed", "options"), CASES)
 def test_rates_of_momenta_are_external_forces(seed: int, options: dict[str, bool]) -> None:
     tree = numeric(seed, **options)
