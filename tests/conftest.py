@@ -24,7 +24,7 @@ QUICKLY = {
 }
 # Commands of compilers, which workers inherit: for most tests, and for those of generated C.
 QUICK, NATIVE = "SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"
-NATIVE_FOLDERS = "backend", "bench", "gpu"
+NATIVE_FOLDERS = "backend", "bench", "gpu", "notebooks"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
 
