@@ -65,7 +65,7 @@ def test_notebook_holds_no_outputs(source: Path) -> None:
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
 def test_kept_results_belong_to_the_code(source: Path) -> None:
-    """What the pages show below the code was shown by that code, and every picture that they name is there."""
+    """What the pages show below the code was shown by that code, and every picture and view that they name is there."""
     kept = json.loads((FOLDER / "results" / f"{source.stem}.json").read_text(encoding="utf-8"))
     cells = [cell.source for cell in jupytext.read(source).cells if cell.cell_type == "code"]
     codes = [hashlib.sha256(code.encode()).hexdigest()[:16] for code in cells]
@@ -73,6 +73,8 @@ def test_kept_results_belong_to_the_code(source: Path) -> None:
     pictures = {output["image"] for cell in kept for output in cell["outputs"] if "image" in output}
     assert pictures == {path.name for path in (FOLDER / "results").glob(f"{source.stem}_*.png")
                         if path.stem.removeprefix(f"{source.stem}_").isdigit()}
+    views = {output["view"] for cell in kept for output in cell["outputs"] if "view" in output}
+    assert views == {path.stem for path in (FOLDER / "results").glob(f"{source.stem}_view_*.json")}
 
 
 if __name__ == "__main__":

@@ -148,8 +148,34 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
         assert f'href="tutorials/{source.stem}.html"' in listed, source.stem
         assert page.count('class="highlight-python') > 2 and f"{source.stem}.ipynb" in page, source.stem
         assert 'class="highlight-text' in page or '<div class="formula">' in page, source.stem
-        views = re.search(r"^(?!plt)\w+\.(view|show)\(\)$", source.read_text(encoding="utf-8"), re.MULTILINE)
-        assert ("A notebook shows a page here" in page) == (views is not None) and "View(&#39;" not in page, source.stem
+        views = re.findall(r"^(?!plt)\w+\.(?:view|show)\(\)$", source.read_text(encoding="utf-8"), re.MULTILINE)
+        assert page.count('<iframe class="view"') == len(views) and "View(&#39;" not in page, source.stem
+
+
+@pytest.mark.parametrize(("name", "views"), [("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),
+                                             ("wheel_on_a_road", 1)])
+def test_views_of_tutorials_are_drawn(site: Path, shown: Any, name: str, views: int) -> None:
+    """What a notebook showed as a page that turns is drawn on the tutorial's page, without a word on the console."""
+    page = shown.new_page()
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto((site / "tutorials" / f"{name}.html").as_uri())
+    frames = page.query_selector_all("iframe.view")
+    assert len(frames) == views
+    for frame in frames:
+        frame.scroll_into_view_if_needed()
+        view = frame.content_frame()
+        view.wait_for_function("window.symdyn && symdyn.stage.frames > 0", timeout=20_000)
+        colors, seen = view.evaluate("""() => { const { stage } = symdyn, { canvas, renderer } = stage, gl = renderer.gl;
+            stage.draw(false);
+            const p = new Uint8Array(4 * canvas.width * canvas.height);
+            gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+            const pixels = new Uint32Array(p.buffer);
+            return [new Set(pixels).size, pixels.filter(one => one !== pixels[0]).length / pixels.length]; }""")
+        assert colors > 10 and seen > 0.01  # boxes on a rail have few colours
+    assert not said, said
+    page.close()
 
 
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:

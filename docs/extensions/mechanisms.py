@@ -16,6 +16,8 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+from views import frame
+
 import symdyn as sd
 from symdyn.formulation.equations import Equations
 from symdyn.pipeline import emit
@@ -56,14 +58,9 @@ def _description(name: str) -> str:
 
 
 def _moving(name: str) -> str:
-    view = f"../_static/{name}.html"
-    return textwrap.dedent(f"""\
-        .. raw:: html
-
-           <iframe class="view" src="{view}#play" loading="lazy" title="{name}: its motion"></iframe>
-           <p><a href="{view}">The motion by itself</a></p>
-
-        ``symdyn view {name}`` opens the mechanism with a slider for every coordinate.""")
+    return "\n\n".join([
+        ".. raw:: html", textwrap.indent(frame(f"{name}.html", f"{name}: its motion"), "   "),
+        f"``symdyn view {name}`` opens the mechanism with a slider for every coordinate."])
 
 
 def _equations(system: sd.System) -> str:

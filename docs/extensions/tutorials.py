@@ -11,14 +11,18 @@ import json
 import re
 import sys
 from collections.abc import Iterator
+from html import unescape
 from pathlib import Path
 from typing import Any
 
 import jupytext
 from sphinx.application import Sphinx
+from views import frame
+
+from symdyn.viewer.page import page_of as view_of
 
 ROOT = Path(__file__).parents[2]
-NOTEBOOKS, PAGES = ROOT / "notebooks", ROOT / "docs" / "tutorials"
+NOTEBOOKS, PAGES, VIEWS = ROOT / "notebooks", ROOT / "docs" / "tutorials", ROOT / "generated" / "gallery"
 RESULTS = NOTEBOOKS / "results"
 # Pages have an ending of their own: what stands in .md files is written by hand.
 ENDING = ".myst"
@@ -63,19 +67,23 @@ def block_of(output: dict[str, str]) -> str:
         return f"![{output['text']}](../../notebooks/results/{output['image']})"
     if "latex" in output:
         return f"$$\n{output['latex']}\n$$"
-    if re.fullmatch(r"View\(.*\)", output["text"]):
-        return "*A notebook shows a page here that turns, zooms and plays; the [gallery](../gallery.md) has such pages.*"
+    if "view" in output:
+        return frame(f"{output['view']}.html", output["text"])
     return f"```text\n{output['text']}\n```"
 
 
 def make(app: Sphinx, config: object = None) -> None:
-    """Write all pages that are not there as they should be."""
-    PAGES.mkdir(exist_ok=True)
+    """Write all pages that are not there as they should be, and their views with what the package draws them by now."""
+    for folder in (PAGES, VIEWS):
+        folder.mkdir(parents=True, exist_ok=True)
     wanted = {PAGES / f"{source.stem}{ENDING}": page_of(source) for source in sources()}
+    for file in RESULTS.glob("*_view_*.json"):
+        view = json.loads(file.read_text(encoding="utf-8"))
+        wanted[VIEWS / f"{file.stem}.html"] = view_of(view["name"], view["data"], view["functions"], None).html
     for page, text in wanted.items():
         if not page.exists() or page.read_text(encoding="utf-8") != text:
             page.write_text(text, encoding="utf-8")
-    for page in set(PAGES.glob(f"*{ENDING}")) - set(wanted):
+    for page in {*PAGES.glob(f"*{ENDING}"), *VIEWS.glob("*_view_*.html")} - set(wanted):
         page.unlink()
 
 
@@ -98,15 +106,20 @@ def run(name: str) -> None:
     notebook = jupytext.read(NOTEBOOKS / f"{name}.py")
     NotebookClient(notebook, timeout=LIMIT, kernel_name="python3", resources={"metadata": {"path": str(NOTEBOOKS)}}).execute()
     RESULTS.mkdir(exist_ok=True)
-    for old in RESULTS.glob(f"{name}_*.png"):
+    for old in (*RESULTS.glob(f"{name}_*.png"), *RESULTS.glob(f"{name}_view_*.json")):
         old.unlink()
-    cells, pictures = [], 0
+    cells, pictures, views = [], 0, 0
     for cell in notebook.cells:
         if cell.cell_type != "code":
             continue
         outputs: list[dict[str, str]] = []
         for data in shown_by(cell.outputs):
-            if "image/png" in data:
+            if view := data_of_view(data.get("text/html", "")):
+                views += 1
+                file = f"{name}_view_{views}"
+                (RESULTS / f"{file}.json").write_text(json.dumps(view, ensure_ascii=False) + "\n", encoding="utf-8")
+                outputs.append({"view": file, "text": f"{view['name']}: a view that turns, zooms and moves"})
+            elif "image/png" in data:
                 pictures += 1
                 image = f"{name}_{pictures}.png"
                 (RESULTS / image).write_bytes(small(data["image/png"]))
@@ -134,6 +147,17 @@ def shown_by(outputs: list[Any]) -> Iterator[dict[str, str]]:
             yield dict(output.data)
     if printed:
         yield {"text/plain": printed}
+
+
+def data_of_view(shown: str) -> dict[str, Any] | None:
+    """The name, the data and the functions of a view that a notebook shows; None where it shows something else."""
+    if not shown.startswith("<iframe srcdoc="):
+        return None
+    page = unescape(shown)
+    scripts = re.findall(r"<script[^>]*>\n?(.*?)\n?</script>", page, re.DOTALL)
+    title = re.search("<title>(.*?)</title>", page)
+    assert title is not None and len(scripts) == 3, "the page of a view has three scripts: data, functions, what draws them"
+    return {"name": unescape(title[1]), "data": json.loads(scripts[0]), "functions": scripts[1]}
 
 
 def small(encoded: str) -> bytes:
