@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.pictures.grounds import Ground
 from symdyn.shown import shown
 
 GROUND = -1
@@ -66,6 +67,7 @@ class Mechanism:
     corners       points that contacts have on bodies: body, (3,) in its axes; wheels: radii of bodies that touch with a rim, m
     ropes         lengths of ropes, m, by the names of their connections
     way           how far the mechanism gets in a motion, m; 0 where it is not known
+    grounds       planes of the ground that contacts have: the normal, and normal @ point of their points, m
     """
 
     bodies: Sequence[str]
@@ -86,6 +88,7 @@ class Mechanism:
     wheels: Mapping[int, float] = field(default_factory=dict)
     ropes: Mapping[str, float] = field(default_factory=dict)
     way: float = 0.0
+    grounds: Sequence[Ground] = ()
 
     @property
     def points(self) -> np.ndarray:

@@ -35,7 +35,7 @@ def prismatic_chain(n: int = 2) -> System:
         system.add_joint_force(slider, F[i], name=f"drive{i + 1}")
         parent = body
     system.defaults = {symbol: value for i in range(n) for symbol, value in ((m[i], 2.0 / (i + 1)), (ahead[i], 0.1))}
-    system.initial = {q[0].dot: 0.5, F[0]: 1.0}
+    system.initial = {**dict.fromkeys(q, 0.3), q[0].dot: 0.5, F[0]: 1.0}
     return system
 
 

@@ -7,6 +7,7 @@ import math
 import sympy as sp
 
 from symdyn.model import shapes
+from symdyn.model.bodies import Body
 from symdyn.model.joints import Free, Planar
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.symbols import coordinates, inputs, parameters
@@ -38,6 +39,7 @@ def rolling_disc() -> System:
     system.add_constraint(x.dot + R * (spin * sp.cos(psi) - theta.dot * sp.sin(psi) * sp.sin(theta)), name="no slip along x")
     system.add_constraint(y.dot + R * (spin * sp.sin(psi) + theta.dot * sp.cos(psi) * sp.sin(theta)), name="no slip along y")
     system.defaults = {g: 9.81, m: 1.0, R: 0.5, I_t: 0.25 / 4, I_a: 0.25 / 2}
+    _draw_disc(system, disc, R)
     lean, turn, roll = math.pi / 2 - 0.3, 1.0, -6.0
     system.initial = {z: 0.5 * math.sin(lean), theta: lean, x.dot: -0.5 * (roll + turn * math.cos(lean)), psi.dot: turn,
                       phi.dot: roll}
@@ -64,8 +66,7 @@ def skate() -> System:
     body = system.add_body("skate", mass=m, inertia=I, com=[a, 0])
     system.add_joint(Planar("plane", system.ground, body, [x, y, theta]))
     system.add_constraint(-x.dot * sp.sin(theta) + y.dot * sp.cos(theta), name="edge")
-    system.draw(body, shapes.Box([4 * a, 1.5 * a, a], center=[a, 0, 0]), color="#8fb3d9")
-    system.draw(body, shapes.Line([[-a, 0, 0], [3 * a, 0, 0]], 3.0), color="#24425f")
+    _draw_skate(system, body, a)
     system.defaults = {m: 1.0, I: 0.02, a: 0.1}
     system.initial = {x.dot: -0.5, theta.dot: 4.0}
     system.duration = 5.0
@@ -96,9 +97,27 @@ def sleigh() -> System:
     system.add_torque(body, T)
     system.add_output("track", y)
     system.add_output("centre", y + a * sp.sin(theta))
-    system.draw(body, shapes.Line([[-a, 0, 0], [2 * a, 0, 0]], 3.0), color="#4a6a8a")
+    _draw_skate(system, body, a)
     system.defaults = {m: 1.0, I: 0.02, a: 0.1, k: 50.0}
     system.initial = {x.dot: 1.0, y: 0.01}
     system.units = {k: "N/m"}
     system.duration = 2.0
     return system
+
+
+def _draw_disc(system: System, disc: Body, R: sp.Symbol) -> None:
+    """A thin disc with two diameters on each face, by which one sees that it turns."""
+    half = R / 40
+    system.draw(disc, shapes.Cylinder([0, 0, -half], [0, 0, half], R), color="#8fb3d9")
+    for z in (-1.2 * half, 1.2 * half):
+        system.draw(disc, shapes.Line([[-R, 0, z], [R, 0, z]], 2.0), color="#24425f")
+        system.draw(disc, shapes.Line([[0, -R, z], [0, R, z]], 2.0), color="#24425f")
+
+
+def _draw_skate(system: System, body: Body, a: sp.Symbol) -> None:
+    """A sledge seen from above: its runner, which carries the knife edge, and the load at the centre of mass."""
+    system.draw(body, shapes.Line([[-a, 0, 0], [3 * a, 0, 0]], 4.0), color="#24425f")
+    for y in (-0.5 * a, 0.5 * a):
+        system.draw(body, shapes.Line([[-0.6 * a, y, 0], [2 * a, y, 0], [3 * a, 0, 0]], 2.0), color="#4a6a8a")
+    system.draw(body, shapes.Box([1.2 * a, 1.4 * a, 0.4 * a], center=[a, 0, 0]), color="#8fb3d9")
+    system.draw(body, shapes.Line([[0.5 * a, 0, 0.3 * a], [1.5 * a, 0, 0.3 * a]], 4.0), color="#24425f")

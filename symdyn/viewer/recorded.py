@@ -76,7 +76,8 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
         scene["eta"] = {"names": eta, "values": packed(np.column_stack([solution[c] for c in eta])[order][rows])}
     scene["arrows"] = [_arrows(one, order[rows]) for one in arrows]
     at, _ = touching(solution)
-    scene["ground"] = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
+    level = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
+    scene["grounds"] = [] if level is None else [[*mechanism.up, level]]
     return scene
 
 

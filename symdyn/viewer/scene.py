@@ -51,7 +51,8 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
     return {"bodies": list(m.bodies), "planar": m.planar,
             "length": length, "up": list(m.up), "items": [*map(_plain, items), *threads],
             "meshes": meshes, "water": water, "palette": list(PALETTE), "joints": [list(j) for j in m.joints],
-            "n_points": len(m.points)}
+            "n_points": len(m.points),
+            "grounds": [[*map(_short, normal), _short(level)] for normal, level in m.grounds]}
 
 
 def _plain(item: Item) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 from scipy.spatial import ConvexHull
 
+from symdyn.pictures.grounds import Ground
 from symdyn.pictures.looks import GROUND, PALETTE, Item, Mechanism, looks_of
 from symdyn.pictures.meshes import parts_of
 from symdyn.pictures.ropes import rope
@@ -22,6 +23,8 @@ _AZIMUTH, _ELEVATION = -0.95, 0.34
 _AROUND = 3.0
 # Radius of a circle at least, pixels.
 _LEAST = 3.0
+# Ground in the plane: its thickness, pixels; its colour.
+_THICK, _GROUND_COLOR = 8.0, "#d1d5db"
 # What is left of a colour on faces that are turned away from the light.
 _SHADE = 0.62
 
@@ -43,12 +46,14 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind != "rail"]
     seen = np.concatenate([end for points, wide in room or [(shapes[0][1], 0.0)] for end in (points - wide, points + wide)])
     low, high = seen.min(axis=0), seen.max(axis=0)
-    alone = len(room) == 1 < len(shapes)  # a block without a mechanism: its rail distinguishes it from a box
+    # A block without a mechanism: its rail distinguishes it from a box. A ball alone is no particle where it fills the picture.
+    alone = len(room) == 1 and (len(shapes) > 1 or shapes[0][-1] == "circle")
     span = np.maximum((high - low) * (_AROUND if alone else 1.0), 1e-9)
     scale = min((_WIDE - 2 * _MARGIN) / span[0], (_HIGH - 2 * _MARGIN) / span[1])
     middle = (low + high) / 2
-    drawn = "".join(_text(points, wide, color, kind, scale, middle) for _, points, wide, color, kind in
-                    sorted(shapes, key=lambda shape: (shape[0], shape[-1] != "rail")))  # a rail goes through its block
+    drawn = "".join(_ground(m, plane, axes, scale, middle) for plane in m.grounds)
+    drawn += "".join(_text(points, wide, color, kind, scale, middle) for _, points, wide, color, kind in
+                     sorted(shapes, key=lambda shape: (shape[0], shape[-1] != "rail")))  # a rail goes through its block
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE} {_HIGH}" width="{_WIDE}" height="{_HIGH}" role="img" '
             f'aria-label="{escape(name)}">{drawn}</svg>')
 
@@ -87,6 +92,12 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
         base = ends[0] - size[1] * np.array(m.up)
         ring = _ring(np.array(m.up), 1.0, 0.0)
         yield from _hull(np.concatenate([base + size[0] * ring, ends[0] + size[0] / 4 * ring]), axes, item.color)
+    elif kind == "rod" and np.linalg.norm(ends[1] - ends[0]) < size[0]:  # a wheel: its rim, and the face that is seen
+        axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        half = float(np.linalg.norm(ends[1] - ends[0])) / 2 * (1.0 if axis @ axes[2] > 0 else -1.0)
+        middle = (ends[0] + ends[1]) / 2
+        yield from _hull(middle + _ring(axis, size[0], half), axes, _shaded(item.color, 0.0))
+        yield from _hull(middle + half * axis + _ring(axis, size[0], 0.0), axes, item.color)
     elif len(ends) == 2 and kind != "line":
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
         if kind == "rope":
@@ -155,6 +166,22 @@ def _zigzag(a: np.ndarray, b: np.ndarray, radius: float, axes: np.ndarray) -> It
 def _shaded(color: str, toward: float) -> str:
     red, green, blue = (float(v) * (_SHADE + (1 - _SHADE) * toward) for v in to_rgb(color))
     return str(to_hex((red, green, blue)))
+
+
+def _ground(m: Mechanism, plane: Ground, axes: np.ndarray, scale: float, middle: np.ndarray) -> str:
+    """The ground of a plane from its edge; in space the part of it below the mechanism."""
+    normal, level = plane
+    centre = m.near_points.mean(axis=0)
+    at = centre + (level - normal @ centre) * normal
+    far = (_WIDE + _HIGH) / scale
+    if m.planar:
+        along, down = far * np.cross(normal, [0.0, 0.0, 1.0]), -_THICK / scale * normal
+        corners = np.array([at - along, at + along, at + along + down, at - along + down])
+    else:
+        first, second = _across(normal)
+        half = 0.5 * (_WIDE - 2 * _MARGIN) / scale / np.sqrt(2.0)
+        corners = at + half * np.array([a * first + b * second for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    return _text(corners @ axes[:2].T, 0.0, _GROUND_COLOR, "polygon", scale, middle)
 
 
 def _text(points: np.ndarray, wide: float, color: str, kind: str, scale: float, middle: np.ndarray) -> str:

@@ -70,8 +70,9 @@ class Stage {
         }).flat();
         const low = [0, 1, 2].map(k => all.reduce((m, p) => Math.min(m, p[k]), Infinity));
         const high = [0, 1, 2].map(k => all.reduce((m, p) => Math.max(m, p[k]), -Infinity));
-        const ground = this.scenes[0].data.ground;
-        this.floor = ground ?? all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
+        // The grid lies on level ground, else below all that is drawn.
+        const level = this.scenes[0].data.grounds.find(plane => inner(plane, this.up) > 1 - 1e-6);
+        this.floor = level ? level[3] : all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
         this.radius = Math.max(0.5 * size(minus(high, low)), 0.25 * this.length);
         this.camera = { target: times(add(low, high), 0.5), distance: 1, azimuth: this.planar ? 0 : -0.95, elevation: this.planar ? 0 : 0.34 };
         const aspect = Math.max(0.1, this.canvas.clientWidth / this.scenes.length / (this.canvas.clientHeight || 1));
@@ -147,12 +148,15 @@ class Stage {
     drawScene(scene, dark) {
         const { source, data } = scene, { renderer, library } = this, unitScale = [1, 1, 1];
         scene.picks = [];
-        if (scene.floor) {
-            const place = add(this.home.target, this.up, this.floor - inner(this.home.target, this.up));
-            if (!data.water) renderer.draw(scene.floor, placed(this.ahead, this.side, this.up, place, unitScale), unitScale,
-                dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], 1, 2);
+        if (scene.floor && !data.water) {
+            const lines = dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], planes = data.grounds.length ? data.grounds : [[...this.up, this.floor]];
+            for (const [x, y, z, level] of planes) {
+                const normal = [x, y, z], place = add(this.home.target, normal, level - inner(this.home.target, normal));
+                const side = unit(cross(normal, Math.abs(inner(normal, this.ahead)) < 0.9 ? this.ahead : this.up)), ahead = cross(side, normal);
+                renderer.draw(scene.floor, placed(ahead, side, normal, place, unitScale), unitScale, lines, 1, 2);
+            }
         }
-        if (this.planar && data.ground !== undefined && data.ground !== null) this.drawGround(dark);
+        if (this.planar) for (const plane of data.grounds) this.drawGround(plane, dark);
         for (const item of scene.items) if (!item.layer || (this.layers[item.layer] && item.kind !== "ellipsoid")) this.drawItem(scene, item);
         for (const mesh of scene.meshes) this.drawMesh(scene, mesh);
         if (this.layers.frames) for (let k = 0; k < source.bodies; k++) AXES.forEach(([name, color], i) => {
@@ -277,11 +281,11 @@ class Stage {
         this.renderer.change(mesh.made, mesh.vertices);
     }
 
-    // The flat ground of a plane, seen from its edge.
-    drawGround(dark) {
-        const thick = 0.02 * this.length, wide = 4 * this.radius, one = [wide, thick, thick];
-        const middle = add(this.home.target, this.up, this.floor - thick - inner(this.home.target, this.up));
-        this.renderer.draw(this.library.box, placed(cross(this.up, this.ahead), this.up, this.ahead, middle, one), one,
+    // Flat ground of a plane, as deep as what stands on it.
+    drawGround([x, y, z, level], dark) {
+        const thick = 0.02 * this.length, one = [4 * this.radius, thick, 0.25 * this.length], normal = [x, y, z];
+        const middle = add(this.home.target, normal, level - thick - inner(this.home.target, normal));
+        this.renderer.draw(this.library.box, placed(cross(normal, this.ahead), normal, this.ahead, middle, one), one,
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
 
