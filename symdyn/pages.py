@@ -14,16 +14,19 @@ if TYPE_CHECKING:
     import jinja2
 
 
-# More rows than this are counted.
+# A table with more rows or columns than this stands in a box in which it scrolls.
 ROWS = 12
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """A table of a notebook's page, HTML; the first rows of many."""
-    cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows[:ROWS])
-    more = f'<tr><td colspan="{len(head)}">and {len(rows) - ROWS} more</td></tr>' if len(rows) > ROWS else ""
-    return (f"<table><thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in head)}</tr></thead>"
-            f"<tbody>{cells}{more}</tbody></table>")
+    """A table of a notebook's page, HTML."""
+    cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    text = (f"<table><thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in head)}</tr></thead>"
+            f"<tbody>{cells}</tbody></table>")
+    if max(len(rows), len(head)) <= ROWS:
+        return text
+    return (f'<div tabindex="0" role="region" aria-label="{len(rows)} rows: {escape(head[0])}" '
+            f'style="max-height: 26em; max-width: 100%; overflow: auto">{text}</div>')
 
 
 def titled(thing: object, *tables: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.arguments import take
 from symdyn.errors import ArgumentError, MissingExtra, SymdynError
-from symdyn.pages import ROWS, table, titled
+from symdyn.pages import table, titled
 from symdyn.runtime.consistent import NotConsistent, check_start, consistent, normalised, number
 from symdyn.runtime.masses import real_parameters
 from symdyn.shown import shown
@@ -94,11 +94,9 @@ class Linearization:
         return StateSpace(*self._manifold.matrices, *self._manifold.output_matrices())
 
     def _repr_html_(self) -> str:
-        """A with the names of its rows and columns, as a notebook shows it; the first rows and columns of many."""
-        rows = [(f"d/dt {name}", *(f"{value + 0.0:.4g}" for value in row[:ROWS]))
-                for name, row in zip(self.states, self.A, strict=True)]
-        more = f"<p>and {len(self.states) - ROWS} more columns</p>" if len(self.states) > ROWS else ""
-        return titled(self, table(("A", *self.states[:ROWS]), rows), more)
+        """A with the names of its rows and columns, as a notebook shows it."""
+        rows = [(f"d/dt {name}", *(f"{value + 0.0:.4g}" for value in row)) for name, row in zip(self.states, self.A, strict=True)]
+        return titled(self, table(("A", *self.states), rows))
 
     def tangent(self) -> np.ndarray:
         """x' of the whole state = T [eta; zeta; z'], (n_x, m), with the inputs as they are."""
