@@ -6,7 +6,8 @@ In the source a docstring is plain text: paragraphs, aligned lists of arguments,
                -1: only downwards
 
 formulas that are indented, and examples. Here lists become definitions, formulas literal blocks, and the characters that
-reStructuredText would read as markup are escaped.
+reStructuredText would read as markup are escaped. Of classes that symdyn makes, and users only receive, the sentence and the
+example come first, what they hold last, and their constructors are not shown.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from sphinx.application import Sphinx
 ITEM = re.compile(r"(\S+(?: \S+)*?) {2,}(\S.*)")
 EXAMPLE = ">>>"
 CODE = re.compile("`[^`]+`")
+# Classes whose objects are results.
+MADE = {"Module", "Solution", "Equations", "Linearization", "Campbell", "Carried", "Rest", "Equilibrium", "RootLocus", "Modes",
+        "PeriodicMotion", "Regulator", "Response", "Stability", "Ensemble", "Fit", "Identification", "Optimum", "View"}
 MARKUP = re.compile(r"([\\*|`]|_\b|\b_)")
 
 
@@ -93,9 +97,27 @@ def _paragraphs(block: list[str]) -> list[str]:
 
 def convert(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Replaces the lines of a docstring."""
+    if what == "class" and name.rpartition(".")[2] in MADE:
+        lines[:] = with_fields_last(lines)
     lines[:] = converted(lines)
+
+
+def with_fields_last(lines: list[str]) -> list[str]:
+    """The paragraphs and the example, then the lists of what an object holds."""
+    held, others = [], []
+    for block in blocks(lines):
+        example = block[0].lstrip().startswith(EXAMPLE)
+        (held if not example and any(ITEM.fullmatch(line) for line in block) else others).append(block)
+    return [line for block in [*others, *held] for line in (*block, "")]
+
+
+def without_constructor(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None,
+                        returns: str | None) -> tuple[str, None] | None:
+    """No arguments of classes that users do not construct."""
+    return ("", None) if what == "class" and name.rpartition(".")[2] in MADE else None
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", convert)
+    app.connect("autodoc-process-signature", without_constructor)
     return {"parallel_read_safe": True}
