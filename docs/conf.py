@@ -15,7 +15,8 @@ author = copyright = "the symdyn developers"
 release = version = symdyn.__version__
 html_title = f"symdyn {version}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "tutorials", "outside"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "measured",
+              "tutorials", "outside"]
 exclude_patterns = ["extensions"]
 root_doc = "index"
 source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".myst": "markdown"}

@@ -7,7 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import symdyn as sd
 from symdyn.cli import main
+from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -59,12 +61,51 @@ def test_readme_is_short():
     assert len(README.splitlines()) <= 150
 
 
+# Times and errors of the README that are rounded: the stored result, the line, and what makes the same unit of it.
+ROUNDED = {
+    "0.15": ("figures", "spatial_chain(7): one compiled evaluation ", 1.0),
+    "0.30": ("figures", "double_pendulum: 10 s inside the integrator ", 1.0),
+    "5e-12": ("figures", "puma560: energy error over 10 s of free motion, rtol 1e-11 ", 1.0),
+    "0.044": ("batch", "spatial_chain(7): a state among many ", 1e-3),
+}
+
+
+def stored(name):
+    return json.loads((ROOT / "docs" / "measured" / f"{name}.json").read_text(encoding="utf-8"))
+
+
 def test_figures_are_those_of_their_pages():
-    """Every number of the table of speed and accuracy stands on a page that has the command for it."""
-    table = README.partition("## How fast, how accurate")[2].partition("## License")[0]
-    rows = [row for row in re.findall(r"^\| (.+) \|$", table, re.MULTILINE) if re.search(r"\d", row)]
+    """Every number of the tables of comparison, speed and accuracy stands on a page or in a stored result that has the command
+    for it, or is rounded from one."""
     pages = "\n".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
-                      for name in ("measured", "work_against_error", "firmware"))
+                      for name in ("work_against_error", "firmware", "from_sympy", "contact", "measured"))
+    pages += "\n".join(" ".join(row) for name in ("peers", "robots") for row in stored(name)["rows"])
+    pages += "\n".join(f"{float(word):,.0f}" for word in re.findall(r"\b\d{4,}\b", " ".join(stored("comparison")["lines"])))
+    table = README.partition("## How it compares")[2].partition("## License")[0]
+    rows = [row for row in re.findall(r"^\| (.+) \|$", re.sub(r"\]\([^)]*\)", "]", table), re.MULTILINE) if re.search(r"\d", row)]
     numbers = {number for row in rows for number in re.findall(r"(?<![\w.])\d[\d,]*(?:\.\d+)?(?:e-?\d+)?", row)}
-    assert len(rows) == 8 and len(numbers) > 15
-    assert {number for number in numbers if not re.search(rf"(?<![\d.,]){re.escape(number)}(?![\d.])", pages)} == set()
+    assert len(rows) == 11 and len(numbers) > 20
+    assert {number for number in numbers - set(ROUNDED) if not re.search(
+        rf"(?<![\d.,]){re.escape(number)}(?![\d.])", pages)} == set()
+
+
+def test_rounded_figures_are_the_stored_ones():
+    for shown, (name, begin, factor) in ROUNDED.items():
+        (line,) = [line for line in stored(name)["lines"] if line.startswith(begin)]
+        value = factor * float(line.removeprefix(begin).split()[0])
+        digits = len(shown.partition("e")[0].replace(".", "").lstrip("0"))
+        assert shown in README and float(shown) == float(f"{value:.{digits}g}"), (shown, line)
+
+
+def test_stored_results_are_of_what_is_there():
+    """Each has a command of the page, a day and a machine; the counts of the reference are those of now."""
+    page = "".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("measured", "index"))
+    used = set(re.findall(r"```\{measured\} (\w+)", page))
+    assert used == {file.stem for file in (ROOT / "docs" / "measured").glob("*.json")}
+    for name in used:
+        result = stored(name)
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", result["date"]) and result["machine"] and result.get("lines", result.get("rows"))
+        assert result["command"].startswith(("symdyn ", "python tests/checks/"))
+    counts = [list(map(int, re.match(r"(\d+) of (\d+)", line).groups())) for line in stored("reference")["lines"][:3]]
+    methods = [name for name in PUBLIC if not name.startswith("sd.")]
+    assert counts == [[n, n] for n in (len(sd.__all__), len(methods), len(PUBLIC))], "run docs/extensions/measured.py reference"

@@ -26,8 +26,8 @@ LONG_RTOL = 1e-9
 # Andrews' mechanism: this error, relative, in less than this time inside the integrator, s.
 FAST = (1e-6, 1e-3)
 TOLERANCES = tuple(10.0**-k for k in range(4, 13))
-HEADING = (f"{'mechanism':39}{'s':>6}{'rtol':>7}{'steps':>7}{'ms':>8}  {'reference':12}{'error q':>9}{'error u':>9}{'precise':>9}"
-           f"{'energy':>9}{'C':>9}{'C_dot':>9}{'over s':>8}{'rank':>7}")
+HEADING = (f"{'mechanism':39}{'s':>6}{'rtol':>7}{'steps':>7}{'ms':>10}  {'reference':12}{'error q':>9}{'error u':>9}"
+           f"{'precise':>9}{'energy':>9}{'C':>9}{'C_dot':>9}{'over s':>8}{'rank':>7}")
 LEGEND = f"""\
 ms: inside the compiled integrator, median; error q, u: largest of positions (m, rad) and speeds (m/s, rad/s) against the
 reference, of andrews_squeezer relative, entry by entry; precise: at the end, against the motion at more digits
@@ -66,7 +66,7 @@ class Row:
         rank = "-" if self.rank == (0, 0) else "..".join(str(r) for r in sorted(set(self.rank)))
         values = self.error_q, self.error_u, self.precise, self.energy, self.violation_q, self.violation_u
         figures = "".join(f"{'' if math.isnan(v) else f'{v:.1e}':>9}" for v in values)
-        return (f"{self.name:39}{self.duration:>6g}{self.rtol:>7.0e}{self.steps:>7}{self.seconds * 1e3:>8.3f}  "
+        return (f"{self.name:39}{self.duration:>6g}{self.rtol:>7.0e}{self.steps:>7}{self.seconds * 1e3:>10.3f}  "
                 f"{self.reference:12}{figures}{self.long:>8g}{rank:>7}  {'; '.join(self.misses)}").rstrip()
 
 
