@@ -26,6 +26,24 @@ TOLERANCE = mpmath.mpf(10) ** -25
 HIGH = 80
 STEP = mpmath.mpf(10) ** -20
 GRAVITY = 9.81
+# In a page: text with less contrast to what is behind it than WCAG 2.2 AA asks for, 4.5, of large letters 3. Colours that let
+# others through are mixed with what is behind.
+CONTRAST = """() => {
+    const channel = v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const parse = text => { const [r, g, b, a = 1] = (text.match(/[\\d.]+/g) || [0, 0, 0, 1]).map(Number);
+        return text.startsWith("color(srgb") ? [255 * r, 255 * g, 255 * b, a] : [r, g, b, a]; };
+    const light = c => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
+    const over = (front, back) => [0, 1, 2].map(k => front[3] * front[k] + (1 - front[3]) * back[k]);
+    const behind = e => { if (!e) return [255, 255, 255]; const c = parse(getComputedStyle(e).backgroundColor);
+        return c[3] > 0.99 ? c : over(c, behind(e.parentElement)); };
+    return [...document.querySelectorAll("body *")].filter(e => e.checkVisibility() && [...e.childNodes].some(
+        n => n.nodeType === 3 && n.textContent.trim()) && !["SCRIPT", "STYLE", "OPTION"].includes(e.tagName)).flatMap(e => {
+        const style = getComputedStyle(e), back = behind(e), a = light(over(parse(style.color), back)), b = light(back);
+        const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), size = parseFloat(style.fontSize);
+        const large = size >= 24 || (size >= 18.66 && style.fontWeight >= 700);
+        return ratio < (large ? 3 : 4.5) ? [e.tagName + " " + e.textContent.slice(0, 20) + " " + ratio.toFixed(2)] : [];
+    });
+}"""
 
 
 def swept(cases: Iterable[Any], *few: Any) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import os
 import re
 import subprocess
@@ -10,13 +11,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from html import unescape
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import unquote
 
 import pytest
 
 import symdyn as sd
-from tests.helpers import browser
+from tests.helpers import CONTRAST, browser
 
 ROOT = Path(__file__).parents[1]
 # As wide as screens, with and without the contents of a page at its side, and as a telephone.
@@ -91,6 +92,49 @@ def test_pages_work_without_a_network(site: Path, shown: Any, name: str) -> None
         assert all(url.startswith(("file:", "data:")) for url in asked) and not said, (asked, said)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", [*PAGES, "search", "messages", "theory/embedding", "reference/errors"])
+def test_text_can_be_read(site: Path, shown: Any, name: str, scheme: Literal["light", "dark"]) -> None:
+    """Contrast AA of all text: contents, code, tables, formulas; a reader's choice of dark or light counts as well."""
+    page = shown.new_page(color_scheme=scheme)
+    page.goto((site / f"{name}.html").as_uri())
+    assert page.evaluate(CONTRAST) == []
+    chosen = {"light": "dark", "dark": "light"}[scheme]
+    page.evaluate("theme => { document.body.dataset.theme = theme; }", chosen)
+    assert page.evaluate(CONTRAST) == []
+    brightness = page.evaluate("getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)[0]")
+    assert (brightness < 128) == (chosen == "dark")
+    page.close()
+
+
+def test_text_that_cannot_be_read_is_found(shown: Any) -> None:
+    """Grey text is a fault and large grey text is none; what lets its background through counts as it is seen."""
+    page = shown.new_page(color_scheme="light")
+    page.set_content("<p style='color: #808080'>small</p><p style='color: #808080; font-size: 30px'>large</p>"
+                     "<p style='color: rgba(0, 0, 0, 0.4)'>faint</p><p>black</p>")
+    assert [fault.split()[1] for fault in page.evaluate(CONTRAST)] == ["small", "faint"]
+    page.close()
+
+
+@pytest.mark.parametrize("name", ["index", "gallery", "gallery/puma560", "reference/module", "tutorials/robot_arm_from_urdf"])
+def test_the_keyboard_reaches_everything(site: Path, shown: Any, name: str) -> None:
+    """Tab goes to every link, button and field of a page that is seen, in a cycle, and each has an outline then."""
+    page = shown.new_page(viewport={"width": 1400, "height": 900})
+    page.goto((site / f"{name}.html").as_uri())
+    page.evaluate("""() => { window.reached = new Set(); window.unseen = new Set();
+        window.reachable = [...document.querySelectorAll("a[href], button, input, select, summary, iframe, [tabindex]")].filter(
+            e => e.checkVisibility({ visibilityProperty: true }) && e.tabIndex >= 0 && !e.disabled); }""")
+    count = page.evaluate("reachable.length")
+    assert count > 20
+    for _ in range(count + 60):  # what an embedded page has is passed as well
+        page.keyboard.press("Tab")
+        page.evaluate("""() => { const e = document.activeElement, style = getComputedStyle(e); reached.add(e);
+            if (reachable.includes(e) && e.tagName !== "IFRAME" && style.outlineStyle === "none") unseen.add(e); }""")
+    for faulty in ("reachable.filter(e => !reached.has(e))", "[...unseen]"):
+        assert page.evaluate(f"{faulty}.map(e => e.outerHTML.slice(0, 120))") == []
+    page.close()
 
 
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.sweep)])
@@ -176,6 +220,24 @@ def test_views_of_tutorials_are_drawn(site: Path, shown: Any, name: str, views: 
         assert colors > 10 and seen > 0.01  # boxes on a rail have few colours
     assert not said, said
     page.close()
+
+
+def test_measured_figures_are_rows_of_tables(site: Path) -> None:
+    """Every stored line is on the page with its command and day: of figures a row each, of other output as it was printed."""
+    page = (site / "measured.html").read_text(encoding="utf-8").replace("’", "'")
+    text = unescape(re.sub("<[^>]+>", "", page))
+    for file in (ROOT / "docs" / "measured").glob("*.json"):
+        stored = json.loads(file.read_text(encoding="utf-8"))
+        if file.stem == "reference":
+            continue
+        assert f"{stored['command']}, {stored['date']}: {stored['machine']}." in text
+        for line in stored.get("lines", ()):
+            assert line in text or f"<td><p>{line.partition('  ')[0].replace('>', '&gt;')}</p></td>" in page, line
+        for cell in {cell for row in stored.get("rows", ()) for cell in row if cell}:
+            assert f"<p>{cell}</p></td>" in page, cell
+    assert "<td><p>spatial_chain(7): operations of the right-hand side</p></td>\n<td><p>1191</p></td>" in page
+    counted = unescape(re.sub("<[^>]+>", "", (site / "index.html").read_text(encoding="utf-8")))
+    assert "public names have an entry in the reference" in counted and "have an example that runs" in counted
 
 
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:

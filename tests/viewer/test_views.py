@@ -19,7 +19,7 @@ from symdyn.cli import main
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.viewer import View
 from tests.firefox import FirefoxPage, firefox
-from tests.helpers import browser
+from tests.helpers import CONTRAST, browser
 from tests.user_functions import HEIGHT
 
 pytest.importorskip("matplotlib")
@@ -328,22 +328,6 @@ def test_nothing_is_wider_than_its_box(wide: int, dark: bool, arm: Solution, eve
                 .map(e => e.tagName + "." + e.className)""")
             assert wider == []
             assert opened.page.evaluate(CONTRAST) == []
-
-
-# Text with less contrast to what is behind it than WCAG 2.2 AA asks for, 4.5.
-CONTRAST = """() => {
-    const channel = v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
-    const parse = text => text.match(/[\\d.]+/g).map(Number);
-    const light = c => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
-    const behind = e => { for (; e; e = e.parentElement) { const c = parse(getComputedStyle(e).backgroundColor);
-        if (c.length < 4 || c[3] > 0.99) return c; } return [255, 255, 255]; };
-    return [...document.querySelectorAll("body *")].filter(e => e.checkVisibility() && [...e.childNodes].some(
-        n => n.nodeType === 3 && n.textContent.trim()) && !["SCRIPT", "STYLE", "OPTION"].includes(e.tagName)).flatMap(e => {
-        const a = light(parse(getComputedStyle(e).color)), b = light(behind(e));
-        const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-        return ratio < 4.5 ? [e.tagName + " " + e.textContent.slice(0, 20) + " " + ratio.toFixed(2)] : [];
-    });
-}"""
 
 
 def test_the_keyboard_reaches_every_control(arm: Solution, chromium: Any, tmp_path: Path) -> None:
