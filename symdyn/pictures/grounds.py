@@ -31,7 +31,7 @@ def grounds_of(at: np.ndarray, gaps: np.ndarray, near: float) -> list[Ground]:
         levels = places @ normal - distances
         if abs(np.linalg.norm(normal) - 1.0) > _UNIT or np.ptp(levels) > near:
             continue
-        normal, level = np.round(normal, _DIGITS) + 0.0, float(levels.mean())
+        normal, level = np.asarray(np.round(normal, _DIGITS) + 0.0), float(levels.mean())
         if not any(np.abs(normal - other).max() <= _UNIT and abs(level - height) <= near for other, height in found):
             found.append((normal, level))
     return found

@@ -149,11 +149,13 @@ class Stage {
         const { source, data } = scene, { renderer, library } = this, unitScale = [1, 1, 1];
         scene.picks = [];
         if (scene.floor && !data.water) {
+            // As large as the way of the motion.
+            const grow = Math.max(1, this.radius / (1.2 * data.length)), wide = [grow, grow, 1];
             const lines = dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], planes = data.grounds.length ? data.grounds : [[...this.up, this.floor]];
             for (const [x, y, z, level] of planes) {
                 const normal = [x, y, z], place = add(this.home.target, normal, level - inner(this.home.target, normal));
                 const side = unit(cross(normal, Math.abs(inner(normal, this.ahead)) < 0.9 ? this.ahead : this.up)), ahead = cross(side, normal);
-                renderer.draw(scene.floor, placed(ahead, side, normal, place, unitScale), unitScale, lines, 1, 2);
+                renderer.draw(scene.floor, placed(ahead, side, normal, place, wide), wide, lines, 1, 2);
             }
         }
         if (this.planar) for (const plane of data.grounds) this.drawGround(plane, dark);
