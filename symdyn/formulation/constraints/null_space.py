@@ -170,23 +170,22 @@ def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[i
     sample (m, n): C at a state, scaled; structure (m, n): where C is not zero by structure
     """
     A, filled = sample.astype(float).copy(), structure.copy()
-    rows, columns = set(range(len(A))), set(range(A.shape[1]))
+    waiting, free = np.ones(len(A), dtype=bool), np.ones(A.shape[1], dtype=bool)
     pivots: list[tuple[int, int]] = []
-    while rows:
-        r, c = sorted(rows), sorted(columns)
-        part = np.abs(A[np.ix_(r, c)])
-        if not part.size or part.max() < 1e-9:
+    for _ in range(len(A)):
+        open_entries = filled & waiting[:, None] & free
+        size = np.where(waiting[:, None] & free, np.abs(A), 0.0)
+        largest = size.max(axis=1, initial=0.0)
+        admitted = open_entries & (size >= ADMITTED * largest[:, None]) & (largest > 1e-9)[:, None]
+        if not admitted.any():
             return None
-        best = min(((filled[i, c].sum() - 1) * (filled[r, j].sum() - 1), -abs(A[i, j]), i, j)
-                   for i in r for j in c if filled[i, j] and abs(A[i, j]) >= ADMITTED * np.abs(A[i, c]).max() > 1e-9)
-        _, _, i, j = best
+        fill = np.outer(open_entries.sum(axis=1) - 1, open_entries.sum(axis=0) - 1)
+        least = admitted & (fill == fill[admitted].min())
+        i, j = (int(k) for k in np.unravel_index(np.argmax(np.where(least, size, -1.0)), A.shape))
         pivots.append((i, j))
-        rows.remove(i)
-        columns.remove(j)
-        for k in rows:
-            if A[k, j] != 0:
-                A[k] -= A[k, j] / A[i, j] * A[i]
-            if filled[k, j]:
-                filled[k] |= filled[i]
-            A[k, j] = 0.0
+        waiting[i] = free[j] = False
+        below = np.flatnonzero(waiting & (A[:, j] != 0))
+        A[below] -= np.outer(A[below, j] / A[i, j], A[i])
+        filled[waiting & filled[:, j]] |= filled[i]
+        A[waiting, j] = 0.0
     return pivots
