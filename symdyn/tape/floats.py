@@ -26,9 +26,9 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
         done = walk(tape.steps, Arrays(values))
     result = {}
     for name, output in tape.outputs.items():
-        flat = np.empty((n, len(output.entries)))
-        for k, e in enumerate(output.entries):
-            flat[:, k] = done.of(e)
+        flat = np.tile(output.numbers, (n, 1))
+        for k, node in output.nodes:
+            flat[:, k] = done[node]
         result[name] = flat.reshape((n, *output.shape))
     return result
 

@@ -32,6 +32,16 @@ class Output:
         array = np.asarray(value, dtype=object)
         return cls(name, array.shape, tuple(array.ravel().tolist()))
 
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """The entries as doubles, zeros in place of nodes, (n,)."""
+        return np.array([0.0 if isinstance(e, Node) else float(e) for e in self.entries])
+
+    @cached_property
+    def nodes(self) -> tuple[tuple[int, Node], ...]:
+        """Entries that are nodes, with their indices."""
+        return tuple((k, e) for k, e in enumerate(self.entries) if isinstance(e, Node))
+
     def array(self) -> np.ndarray:
         result = np.empty(len(self.entries), dtype=object)
         result[:] = self.entries
