@@ -71,6 +71,20 @@ def saddle_points(n: int, m: int) -> np.ndarray:
     return broken(rng, np.array(rows))
 
 
+def chains(n: int, m: int) -> np.ndarray:
+    """Rows k of C with entries k to k + 2, masses coupled with the next one: everything far from the diagonal is zero."""
+    rng, rows = np.random.default_rng(n), []
+    near = np.arange(n) - np.arange(m)[:, None]
+    for k in range(EACH):
+        w = 10.0 ** rng.uniform(-3, 3, n)
+        L = np.triu(np.tril(masses(rng, n, k % 5)), -1)
+        C = constraints(rng, n, m, 0) * ((near >= 0) & (near <= 2)) * (rng.random((m, n)) < 0.9) / w
+        M = L @ L.T / w[:, None] / w
+        rows.append(np.concatenate([[SMOOTHED], M[np.tril_indices(n)], C.ravel(), rng.uniform(0.1, 3, m), w,
+                                    rng.normal(size=n + m)]))
+    return broken(rng, np.array(rows))
+
+
 def forces(n: int, m: int) -> np.ndarray:
     rng, rows = np.random.default_rng(n), []
     for k in range(EACH):
@@ -143,6 +157,7 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
 
 KERNELS: dict[str, tuple[Kernel, Callable[[], np.ndarray]]] = {
     **{f"saddle {n} {m}": (Saddle((n, m), ""), lambda n=n, m=m: saddle_points(n, m)) for n, m in SIZES},
+    "saddle of a chain": (Saddle((12, 9), ""), lambda: chains(12, 9)),
     **{f"multipliers {n} {m}": (Multipliers((n, m), ""), lambda n=n, m=m: forces(n, m)) for n, m in SIZES},
     **{f"cube {order}": (Cube((order,), ""), lambda order=order: cuts(order)) for order in (0, 1, 2)},
     **{f"catenary {seabed}": (Catenary((seabed,), ""), lambda seabed=seabed: lines(seabed)) for seabed in (0, 1)},

@@ -178,24 +178,63 @@ static inline double symdyn_less(double start, int n, const double *a, int step,
     return start;
 }
 
-// A = L D L^T in place, by lower triangles (n x n, rows `row` apart). Returns 1 if a pivot is no more than `least` of its entry.
-static int symdyn_factorize(int n, int row, double *A, double least) {
+// 0, or no number where one of them is none or infinite: zeros that are passed over would have spread it.
+static double symdyn_spoiled(int n, const double *values) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) sum += 0.0 * values[i];
+    return sum;
+}
+
+// Columns of a row of n entries from the first to the one behind the last that is not zero.
+typedef struct {
+    int first, end;
+} symdyn_span;
+
+static symdyn_span symdyn_span_of(int n, const double *row) {
+    symdyn_span span = {0, n};
+    while (span.end > 0 && row[span.end - 1] == 0.0) span.end--;
+    while (span.first < span.end && row[span.first] == 0.0) span.first++;
+    return span;
+}
+
+// The envelope of a symmetric matrix, which its factors L D L^T stay within: of row i the first column, and of column i the end
+// of its rows. first: that of the matrix alone, n at most. Source: George and Liu, Computer Solution of Large Sparse Positive
+// Definite Systems, chapter 4.
+static void symdyn_envelope(int n, const int *first, symdyn_span *envelope) {
+    for (int i = 0; i < n; i++) {
+        envelope[i].first = first[i] < i ? first[i] : i;
+        for (int k = envelope[i].first; k <= i; k++) envelope[k].end = i + 1;
+    }
+}
+
+// A = L D L^T in place, by lower triangles (n x n, rows `row` apart) within the envelope. Returns 1 if a pivot is no more than
+// `least` of its entry.
+static int symdyn_factorize(int n, int row, const symdyn_span *envelope, double *A, double least) {
     for (int j = 0; j < n; j++) {
         const double entry = A[j * row + j];
-        for (int k = 0; k < j; k++) {
+        for (int k = envelope[j].first; k < j; k++) {
             const double v = A[j * row + k] * A[k * row + k];
-            for (int i = j; i < n; i++) A[i * row + j] -= A[i * row + k] * v;
+            for (int i = j; i < envelope[k].end; i++)
+                if (envelope[i].first <= k) A[i * row + j] -= A[i * row + k] * v;
         }
         if (!(A[j * row + j] > least * entry && A[j * row + j] > 0.0)) return 1;
-        for (int i = j + 1; i < n; i++) A[i * row + j] /= A[j * row + j];
+        for (int i = j + 1; i < envelope[j].end; i++)
+            if (envelope[i].first <= j) A[i * row + j] /= A[j * row + j];
     }
     return 0;
 }
 
 // r becomes A^-1 r by these factors.
-static void symdyn_substitute(int n, int row, const double *A, double *r) {
-    for (int i = 0; i < n; i++) r[i] = symdyn_less(r[i], i, A + i * row, 1, r);
-    for (int i = n - 1; i >= 0; i--) r[i] = symdyn_less(r[i] / A[i * row + i], n - 1 - i, A + (i + 1) * row + i, row, r + i + 1);
+static void symdyn_substitute(int n, int row, const symdyn_span *envelope, const double *A, double *r) {
+    for (int i = 0; i < n; i++) {
+        const int first = envelope[i].first;
+        r[i] = symdyn_less(r[i], i - first, A + i * row + first, 1, r + first);
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        r[i] /= A[i * row + i];
+        for (int k = i + 1; k < envelope[i].end; k++)
+            if (envelope[k].first <= i) r[i] -= A[k * row + i] * r[k];
+    }
 }
 
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
@@ -209,16 +248,25 @@ SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam
     const double smoothed = SYMDYN_SMOOTHED * SYMDYN_SMOOTHED;
     double A[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_M], C[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_N],
         r[SYMDYN_MULTIPLIERS_M] = {0.0};
+    symdyn_span span[SYMDYN_MULTIPLIERS_M], envelope[SYMDYN_MULTIPLIERS_M];
+    int nearest[SYMDYN_MULTIPLIERS_M];
     for (int k = 0; k < m; k++) {
         lam[k] = 0.0;
         for (int j = 0; j < n; j++) C[k][j] = rows[k] * columns[j] * in[k * n + j];
+        span[k] = symdyn_span_of(n, C[k]);
     }
-    for (int i = 0; i < m; i++)
+    for (int i = 0; i < m; i++) {
+        nearest[i] = i;
         for (int j = 0; j <= i; j++) {
+            const int begin = span[i].first > span[j].first ? span[i].first : span[j].first;
+            const int end = span[i].end < span[j].end ? span[i].end : span[j].end;
             A[i][j] = i == j ? smoothed : 0.0;
-            for (int k = 0; k < n; k++) A[i][j] += C[i][k] * C[j][k];
+            for (int k = begin; k < end; k++) A[i][j] += C[i][k] * C[j][k];
+            if (begin < end && j < nearest[i]) nearest[i] = j;
         }
-    if (symdyn_factorize(m, SYMDYN_MULTIPLIERS_M, A[0], 0.0)) return 1;
+    }
+    symdyn_envelope(m, nearest, envelope);
+    if (symdyn_factorize(m, SYMDYN_MULTIPLIERS_M, envelope, A[0], 0.0)) return 1;
     // Later rounds leave in r what rounding has made of lam outside the range of C; it is taken off.
     for (int round = 0; round < (1 + SYMDYN_CLEANINGS) * SYMDYN_ROUNDS; round++) {
         const int cleans = round >= SYMDYN_ROUNDS, first = round % SYMDYN_ROUNDS == 0,
@@ -228,10 +276,11 @@ SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam
             const double rest = symdyn_less(columns[j] * g[j], m, &C[0][j], SYMDYN_MULTIPLIERS_N, lam);
             for (int k = 0; k < m; k++) r[k] += C[k][j] * rest;
         }
-        symdyn_substitute(m, SYMDYN_MULTIPLIERS_M, A[0], r);
+        symdyn_substitute(m, SYMDYN_MULTIPLIERS_M, envelope, A[0], r);
         for (int k = 0; k < m; k++) lam[k] += !cleans ? r[k] : last ? -r[k] : 0.0;
     }
-    for (int k = 0; k < m; k++) lam[k] *= rows[k];
+    const double spoiled = symdyn_spoiled(m, lam);
+    for (int k = 0; k < m; k++) lam[k] = spoiled == 0.0 ? lam[k] * rows[k] : spoiled;
     return 0;
 }
 
@@ -248,14 +297,17 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
         parts[i] = 1.0 / A[i][i];
     }
     for (int step = 0; step < n; step++) {
-        int p = -1;
+        int p = -1, near[SYMDYN_SADDLE_N], count = 0;
         for (int i = 0; i < n; i++)
             if (!gone[i] && (p < 0 || A[i][i] * parts[i] > A[p][p] * parts[p])) p = i;
         if (A[p][p] * parts[p] <= SYMDYN_LOOSE) return 1;
         gone[p] = 1;
         for (int i = 0; i < n; i++)
-            for (int j = 0; j < n && !gone[i]; j++)
-                if (!gone[j]) A[i][j] -= A[i][p] * A[p][j] / A[p][p];
+            if (!gone[i] && A[p][i] != 0.0) near[count++] = i;
+        for (int i = 0; i < count; i++) {
+            double *const row = A[near[i]];
+            for (int j = 0; j < count; j++) row[near[j]] -= row[p] * A[p][near[j]] / A[p][p];
+        }
     }
     return 0;
 }
@@ -274,6 +326,8 @@ SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
     double M[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], B[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N],
         C[SYMDYN_SADDLE_M][SYMDYN_SADDLE_N], rows[SYMDYN_SADDLE_M] = {0.0}, columns[SYMDYN_SADDLE_N], lighter[SYMDYN_SADDLE_N];
     double r[SYMDYN_SADDLE_N], lam[SYMDYN_SADDLE_M] = {0.0}, largest = 0.0;
+    symdyn_span of_M[SYMDYN_SADDLE_N], of_C[SYMDYN_SADDLE_M], envelope[SYMDYN_SADDLE_N];
+    int first[SYMDYN_SADDLE_N];
     // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
     for (int i = 0; i < n; i++) {
         columns[i] = w[i] * w[i] * m_in[i * (i + 1) / 2 + i];
@@ -291,26 +345,45 @@ SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
         for (int j = 0; j < n; j++) most = c_in[k * n + j] != 0.0 && lighter[j] > most ? lighter[j] : most;
         rows[k] = s[k] / most;
         for (int j = 0; j < n; j++) C[k][j] = rows[k] * columns[j] * c_in[k * n + j];
+        of_C[k] = symdyn_span_of(n, C[k]);
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
-            double sum = 0.0;
             M[i][j] = M[j][i] = columns[i] * columns[j] * m_in[i * (i + 1) / 2 + j];
-            for (int k = 0; k < m; k++) sum += C[k][i] * C[k][j];
-            A[i][j] = B[i][j] = B[j][i] = M[i][j] + a * sum;
+            A[i][j] = 0.0;
         }
-    if (symdyn_loose(n, B) || symdyn_factorize(n, SYMDYN_SADDLE_N, A[0], 0.0)) return 1;
-    for (int round = 0; round < SYMDYN_ROUNDS; round++) {
-        for (int i = 0; i < n; i++) r[i] = symdyn_less(columns[i] * f[i], n, M[i], 1, x);
-        for (int k = 0; k < m; k++) {
-            const double gap = a * symdyn_less(rows[k] * d[k], n, C[k], 1, x) - lam[k];
-            for (int j = 0; j < n; j++) r[j] += C[k][j] * gap;
-        }
-        symdyn_substitute(n, SYMDYN_SADDLE_N, A[0], r);
-        for (int i = 0; i < n; i++) x[i] += r[i];
-        for (int k = 0; k < m; k++) lam[k] -= a * symdyn_less(rows[k] * d[k], n, C[k], 1, x);
+    for (int i = 0; i < n; i++) {
+        of_M[i] = symdyn_span_of(n, M[i]);
+        first[i] = of_M[i].first;
     }
-    for (int i = 0; i < n; i++) x[i] *= columns[i];
+    for (int k = 0; k < m; k++)
+        for (int i = of_C[k].first; i < of_C[k].end; i++) {
+            first[i] = of_C[k].first < first[i] ? of_C[k].first : first[i];
+            for (int j = of_C[k].first; j <= i; j++) A[i][j] += C[k][i] * C[k][j];
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) A[i][j] = B[i][j] = B[j][i] = M[i][j] + a * A[i][j];
+    symdyn_envelope(n, first, envelope);
+    if (symdyn_loose(n, B) || symdyn_factorize(n, SYMDYN_SADDLE_N, envelope, A[0], 0.0)) return 1;
+    for (int round = 0; round < SYMDYN_ROUNDS; round++) {
+        for (int i = 0; i < n; i++) {
+            const int at = of_M[i].first;
+            r[i] = symdyn_less(columns[i] * f[i], of_M[i].end - at, M[i] + at, 1, x + at);
+        }
+        for (int k = 0; k < m; k++) {
+            const int at = of_C[k].first, count = of_C[k].end - at;
+            const double gap = a * symdyn_less(rows[k] * d[k], count, C[k] + at, 1, x + at) - lam[k];
+            for (int j = at; j < of_C[k].end; j++) r[j] += C[k][j] * gap;
+        }
+        symdyn_substitute(n, SYMDYN_SADDLE_N, envelope, A[0], r);
+        for (int i = 0; i < n; i++) x[i] += r[i];
+        for (int k = 0; k < m; k++) {
+            const int at = of_C[k].first;
+            lam[k] -= a * symdyn_less(rows[k] * d[k], of_C[k].end - at, C[k] + at, 1, x + at);
+        }
+    }
+    const double spoiled = symdyn_spoiled(n, x) + symdyn_spoiled(m, lam);
+    for (int i = 0; i < n; i++) x[i] = spoiled == 0.0 ? x[i] * columns[i] : spoiled;
     return 0;
 }
 

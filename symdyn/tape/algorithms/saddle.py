@@ -42,16 +42,40 @@ def symdyn_diagonal(A):
     return A[np.arange(len(A)), np.arange(len(A))]
 
 
+def symdyn_spoiled(values):
+    """0, or no number where one of them is none or infinite: zeros that are passed over would have spread it."""
+    return (0 * values).sum(axis=0)
+
+
+def symdyn_nonzero(A):
+    """Whether entries (n, m) are anything but zero at some state; what is not computed yet counts as such."""
+    if A.dtype == object:
+        return np.array([[not isinstance(e, (int, float)) or e != 0 for e in row] for row in A]).reshape(A.shape)
+    return (A != 0).reshape(*A.shape[:2], -1).any(axis=2)
+
+
+def symdyn_with_square(start, C):
+    """start + C^T C, (n, n), from the entries of C (m, n) that are not zero."""
+    square = start.copy()
+    for row, there in zip(C, symdyn_nonzero(C)):
+        at = np.ix_(np.flatnonzero(there), np.flatnonzero(there))
+        square[at] = square[at] + row[there][:, None] * row[there]
+    return square
+
+
 def symdyn_factorize(xp, A):
     """L, its columns below the diagonal, and D of A = L D L^T by the lower triangle, and whether a pivot is not positive; what
-    is no number passes, and so do infinite entries, which become that."""
+    is no number passes, and so do infinite entries, which become that. L is kept as far as its columns reach."""
     entries, A, L = symdyn_diagonal(A), A.copy(), []
+    first = [min(np.flatnonzero(there[:i + 1]), default=i) for i, there in enumerate(symdyn_nonzero(A))]
+    ends = [max(i for i in range(j, len(A)) if first[i] <= j) + 1 for j in range(len(A))]
     D = A[:, 0].copy()
-    for j in range(len(A)):
-        column = symdyn_less(xp, A[j:, j], np.swapaxes(A[j:, :j], 0, 1) * (A[j, :j] * D[:j])[:, None])
+    for j, end in enumerate(ends):
+        before = slice(first[j], j)
+        column = symdyn_less(xp, A[j:end, j], np.swapaxes(A[j:end, before], 0, 1) * (A[j, before] * D[before])[:, None])
         D[j] = column[0] + 0 * entries[j]
-        A[j + 1:, j] = xp.divide(column[1:], D[j])
-        L.append(A[j + 1:, j].copy())
+        A[j + 1:end, j] = xp.divide(column[1:], D[j])
+        L.append(A[j + 1:end, j].copy())
     return (L, D), xp.logical_or.reduce(xp.less_equal(D, 0))
 
 
@@ -59,10 +83,10 @@ def symdyn_substitute(xp, factors, right):
     """A^-1 right by these factors, (n,)."""
     (L, D), x = factors, right.copy()
     for k, column in enumerate(L):
-        x[k + 1:] -= column * x[k]
+        x[k + 1:k + 1 + len(column)] -= column * x[k]
     x = xp.divide(x, D)
     for i in range(len(x) - 2, -1, -1):
-        x[i] = xp.subtract.reduce(np.concatenate([x[i:i + 1], L[i] * x[i + 1:]]), axis=0)
+        x[i] = xp.subtract.reduce(np.concatenate([x[i:i + 1], L[i] * x[i + 1:i + 1 + len(L[i])]]), axis=0)
     return x
 
 
@@ -91,7 +115,7 @@ def symdyn_saddle_point(xp, n, m, values, least, in_order=False):
     M = columns[:, None] * columns * M
     a = xp.divide(largest, e[0] * e[0])
     f, d = columns * f, rows * d
-    A = M + a * symdyn_less(xp, np.zeros_like(M), -(C[:, :, None] * C[:, None, :]))
+    A = M + a * symdyn_with_square(np.zeros_like(M), C)
     loose = False if least is None or in_order else symdyn_loose(A, least)
     factors, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
     if in_order:
@@ -102,7 +126,7 @@ def symdyn_saddle_point(xp, n, m, values, least, in_order=False):
         r = symdyn_less(xp, symdyn_less(xp, f, M * x[:, None]), -(C * gap[:, None]))
         x = x + symdyn_substitute(xp, factors, r)
         lam = lam - a * symdyn_less(xp, d, Ct * x[:, None])
-    return columns * x, xp.logical_or(loose, failed)
+    return columns * x + (symdyn_spoiled(x) + symdyn_spoiled(lam)), xp.logical_or(loose, failed)
 
 
 def symdyn_least_multipliers(xp, n, m, values, e):
@@ -113,7 +137,7 @@ def symdyn_least_multipliers(xp, n, m, values, e):
     Ct, g, smoothed = np.swapaxes(C, 0, 1), columns * g, e * e
     start = np.zeros((m, m, *values.shape[1:]), dtype=C.dtype)
     start[np.arange(m), np.arange(m)] = smoothed
-    factors, failed = symdyn_factorize(xp, symdyn_less(xp, start, -(Ct[:, :, None] * Ct[:, None, :])))
+    factors, failed = symdyn_factorize(xp, symdyn_with_square(start, Ct))
     lam = np.zeros_like(rows)
     for _ in range(SYMDYN_ROUNDS):
         rest = symdyn_less(xp, g, C * lam[:, None])
@@ -123,4 +147,4 @@ def symdyn_least_multipliers(xp, n, m, values, e):
         for _ in range(SYMDYN_ROUNDS):
             rest = symdyn_substitute(xp, factors, smoothed * rest)
         lam = lam - rest
-    return rows * lam, failed
+    return rows * lam + symdyn_spoiled(lam), failed

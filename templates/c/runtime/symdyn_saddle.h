@@ -14,14 +14,17 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
         parts[i] = 1.0 / A[i][i];
     }
     for (int step = 0; step < n; step++) {
-        int p = -1;
+        int p = -1, near[SYMDYN_SADDLE_N], count = 0;
         for (int i = 0; i < n; i++)
             if (!gone[i] && (p < 0 || A[i][i] * parts[i] > A[p][p] * parts[p])) p = i;
         if (A[p][p] * parts[p] <= SYMDYN_LOOSE) return 1;
         gone[p] = 1;
         for (int i = 0; i < n; i++)
-            for (int j = 0; j < n && !gone[i]; j++)
-                if (!gone[j]) A[i][j] -= A[i][p] * A[p][j] / A[p][p];
+            if (!gone[i] && A[p][i] != 0.0) near[count++] = i;
+        for (int i = 0; i < count; i++) {
+            double *const row = A[near[i]];
+            for (int j = 0; j < count; j++) row[near[j]] -= row[p] * A[p][near[j]] / A[p][p];
+        }
     }
     return 0;
 }
@@ -40,6 +43,8 @@ SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
     double M[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], B[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N],
         C[SYMDYN_SADDLE_M][SYMDYN_SADDLE_N], rows[SYMDYN_SADDLE_M] = {0.0}, columns[SYMDYN_SADDLE_N], lighter[SYMDYN_SADDLE_N];
     double r[SYMDYN_SADDLE_N], lam[SYMDYN_SADDLE_M] = {0.0}, largest = 0.0;
+    symdyn_span of_M[SYMDYN_SADDLE_N], of_C[SYMDYN_SADDLE_M], envelope[SYMDYN_SADDLE_N];
+    int first[SYMDYN_SADDLE_N];
     // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
     for (int i = 0; i < n; i++) {
         columns[i] = w[i] * w[i] * m_in[i * (i + 1) / 2 + i];
@@ -57,25 +62,44 @@ SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
         for (int j = 0; j < n; j++) most = c_in[k * n + j] != 0.0 && lighter[j] > most ? lighter[j] : most;
         rows[k] = s[k] / most;
         for (int j = 0; j < n; j++) C[k][j] = rows[k] * columns[j] * c_in[k * n + j];
+        of_C[k] = symdyn_span_of(n, C[k]);
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
-            double sum = 0.0;
             M[i][j] = M[j][i] = columns[i] * columns[j] * m_in[i * (i + 1) / 2 + j];
-            for (int k = 0; k < m; k++) sum += C[k][i] * C[k][j];
-            A[i][j] = B[i][j] = B[j][i] = M[i][j] + a * sum;
+            A[i][j] = 0.0;
         }
-    if (symdyn_loose(n, B) || symdyn_factorize(n, SYMDYN_SADDLE_N, A[0], 0.0)) return 1;
-    for (int round = 0; round < SYMDYN_ROUNDS; round++) {
-        for (int i = 0; i < n; i++) r[i] = symdyn_less(columns[i] * f[i], n, M[i], 1, x);
-        for (int k = 0; k < m; k++) {
-            const double gap = a * symdyn_less(rows[k] * d[k], n, C[k], 1, x) - lam[k];
-            for (int j = 0; j < n; j++) r[j] += C[k][j] * gap;
-        }
-        symdyn_substitute(n, SYMDYN_SADDLE_N, A[0], r);
-        for (int i = 0; i < n; i++) x[i] += r[i];
-        for (int k = 0; k < m; k++) lam[k] -= a * symdyn_less(rows[k] * d[k], n, C[k], 1, x);
+    for (int i = 0; i < n; i++) {
+        of_M[i] = symdyn_span_of(n, M[i]);
+        first[i] = of_M[i].first;
     }
-    for (int i = 0; i < n; i++) x[i] *= columns[i];
+    for (int k = 0; k < m; k++)
+        for (int i = of_C[k].first; i < of_C[k].end; i++) {
+            first[i] = of_C[k].first < first[i] ? of_C[k].first : first[i];
+            for (int j = of_C[k].first; j <= i; j++) A[i][j] += C[k][i] * C[k][j];
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) A[i][j] = B[i][j] = B[j][i] = M[i][j] + a * A[i][j];
+    symdyn_envelope(n, first, envelope);
+    if (symdyn_loose(n, B) || symdyn_factorize(n, SYMDYN_SADDLE_N, envelope, A[0], 0.0)) return 1;
+    for (int round = 0; round < SYMDYN_ROUNDS; round++) {
+        for (int i = 0; i < n; i++) {
+            const int at = of_M[i].first;
+            r[i] = symdyn_less(columns[i] * f[i], of_M[i].end - at, M[i] + at, 1, x + at);
+        }
+        for (int k = 0; k < m; k++) {
+            const int at = of_C[k].first, count = of_C[k].end - at;
+            const double gap = a * symdyn_less(rows[k] * d[k], count, C[k] + at, 1, x + at) - lam[k];
+            for (int j = at; j < of_C[k].end; j++) r[j] += C[k][j] * gap;
+        }
+        symdyn_substitute(n, SYMDYN_SADDLE_N, envelope, A[0], r);
+        for (int i = 0; i < n; i++) x[i] += r[i];
+        for (int k = 0; k < m; k++) {
+            const int at = of_C[k].first;
+            lam[k] -= a * symdyn_less(rows[k] * d[k], of_C[k].end - at, C[k] + at, 1, x + at);
+        }
+    }
+    const double spoiled = symdyn_spoiled(n, x) + symdyn_spoiled(m, lam);
+    for (int i = 0; i < n; i++) x[i] = spoiled == 0.0 ? x[i] * columns[i] : spoiled;
     return 0;
 }
