@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -214,7 +215,8 @@ CASES = {case.label: case for case in (
     Case("n_four_bar", {"n": 1}, reference=lambda: _windows(1)),
     Case("n_four_bar", {"n": 2}, reference=lambda: _windows(2)),
     # Published with a bound of its own, 1e-3 of the position of the first corner.
-    Case("n_four_bar", {"n": 40}, reference=lambda: _windows(40), end=10.0, long=20.0, bounds={"error_q": 1e-3, "energy": None}),
+    *(Case("n_four_bar", {"n": n}, reference=partial(_windows, n), end=10.0, long=20.0, bounds={"error_q": 1e-3, "energy": None})
+      for n in (40, 100)),
     Case("andrews_squeezer", atol=1e-13, long=0.05, reference=lambda: _published_end("andrews_squeezer", True),
          bounds={"error_q": 1e-9, "precise": 1e-9}),
     Case("car_axis", rtol=1e-12, atol=1e-13, long=3.0, reference=lambda: _published_end("car_axis", False),

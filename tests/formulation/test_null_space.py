@@ -11,11 +11,12 @@ import symdyn as sd
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.constraints.consistent_states import ConstraintStates
 from symdyn.formulation.constraints.null_space import NullSpaceSolver, elimination_order
-from symdyn.formulation.constraints.saddle import RangeSolver, fewest_neighbours
+from symdyn.formulation.constraints.saddle import KernelSolver, RangeSolver, fewest_neighbours, narrow_order
 from symdyn.formulation.probes.dependent_rows import ranks, scaled
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import vector
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import COORDINATE, is_zero
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape
@@ -161,3 +162,29 @@ def test_units_do_not_decide_what_is_a_pivot() -> None:
         found.append(evaluate(Tape.of(recorder, x=vector(*x, *lam)), numbers)["x"].astype(float))
     assert np.isnan(found[0]).all()
     assert np.abs(found[1] - wanted).max() < 1e-10 * np.abs(wanted).max()
+
+
+def test_the_numeric_algorithm_takes_long_chains_in_a_narrow_order() -> None:
+    """A chain whose links are numbered at random: every row of M + C^T C begins next to its diagonal; and the results are
+    those of a direct solution."""
+    n = 40
+    shuffled = np.random.default_rng(5).permutation(n)
+    C, M = np.zeros((n - 10, n)), np.diag(np.linspace(1, 2, n))
+    for k in range(n - 10):
+        C[k, shuffled[k:k + 3]] = 1.0, -2.0 - k / n, 0.5
+    M[shuffled[:-1], shuffled[1:]] = M[shuffled[1:], shuffled[:-1]] = 0.3
+    recorder, numbers = Recorder(), {}
+    Ms, Cs = (leaves(recorder, name, a, numbers) for name, a in (("M", M), ("C", C)))
+    f, d = np.sin(np.arange(n)), np.cos(np.arange(n - 10))
+    solver = KernelSolver(TapeAlgebra(recorder, {}), Ms, Cs, vector(*[1] * len(C)), [1] * n, "loose")
+    near = ((M != 0) | (C.T @ C != 0))[np.ix_(solver.order, solver.order)]
+    assert sorted(solver.order) == list(range(n))
+    assert max(k - np.flatnonzero(row)[0] for k, row in enumerate(near)) <= 3 < max(
+        k - np.flatnonzero(row)[0] for k, row in enumerate((M != 0) | (C.T @ C != 0)))
+    found = evaluate_rows(Tape.of(recorder, x=solver.solve(vector(*f), vector(*d))[0]), numbers, 1)["x"][0]
+    wanted = np.linalg.solve(np.block([[M, C.T], [C, np.zeros((len(C),) * 2)]]), np.concatenate([f, d]))[:n]
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_few_speeds_stay_in_their_order() -> None:
+    assert narrow_order(np.eye(4), np.array([[1.0, 0, 0, 1]])) == [0, 1, 2, 3]
