@@ -6,6 +6,7 @@ beyond the range of doubles. Every border where numbers come in goes through her
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,14 @@ def number_of(value: Any, owner: str, wanted: str) -> float:
         return number(value)
     except NotReal as error:
         raise ArgumentError(f"{owner}: {wanted}, found {shown(value)}: {error}") from None
+
+
+def range_text(least: float, reached: bool, below: float) -> str:
+    """How a message asks for a number above `least`, or from it on if it is `reached`, and below another one, which may be
+    infinite."""
+    if below < math.inf:
+        return f"pass a number from {least:g} to below {below:g}"
+    return f"pass a number from {least:g} on" if reached else f"pass a number above {least:g}"
 
 
 def _check_entries(values: Any) -> None:

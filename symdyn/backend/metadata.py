@@ -154,12 +154,13 @@ class GroupRecord(NamedTuple):
 
 
 class CompliantRecord(NamedTuple):
-    """A compliant contact in one place, its number of rows, and the least numbers that its parameters may be: what each is of the
-    contact, its name, the number, whether that itself is one."""
+    """A compliant contact in one place, its number of rows, and which numbers parameters may give it: what each is of the
+    contact, the parameter's name, "" of an expression, whose value the function compliant_numbers gives; the least number,
+    whether that itself is one, and the number that it stays below."""
 
     name: str
     rows: int
-    least: tuple[tuple[str, str, float, bool], ...] = ()
+    ranges: tuple[tuple[str, str, float, bool, float], ...] = ()
 
 
 class Chart(NamedTuple):

@@ -110,7 +110,8 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name if c.normal else "",
                                      c.switches[-1].name if len(c.rows) > c.normal else "", tuple(s.name for s in c.sliding),
                                      c.events, c.impact, c.kind, c.normal, c.lengths) for c in equations.contacts),
-        compliant=tuple(CompliantRecord(c.name, len(c.rows), tuple(map(tuple, c.least))) for c in equations.compliant),
+        compliant=tuple(CompliantRecord(c.name, len(c.rows), tuple(
+            (what, e.name if e.is_Symbol else "", *limits) for what, e, *limits in c.ranges)) for c in equations.compliant),
         contact_groups=_group_records(equations))
 
 

@@ -77,7 +77,7 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
         yield f"contact {contact.name}", contact.expressions, Scope.MOTION
         yield f"contact {contact.name}: friction and restitution", contact.constants, Scope.PARAMETERS
     for compliant in s.compliant_contacts:
-        yield f"contact {compliant.name}", compliant.expressions, Scope.MOTION
+        yield f"contact {compliant.name}", [*compliant.expressions, *compliant.numbers], Scope.MOTION
     for group in s.lowered_groups:
         yield f"contact group {group.name}", group.constants, Scope.PARAMETERS
     if s.rigid_contacts:

@@ -1,33 +1,60 @@
-"""Parameters of compliant contacts: which numbers they cannot be, as `params` may give them."""
+"""Numbers of compliant contacts that cannot be, as `params` may give them."""
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.real_numbers import range_text
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
+NUMBERS = "compliant_numbers"
 
-def impossible(module: Module, params: np.ndarray) -> dict[int, str]:
-    """What is wrong with numbers of compliant contacts, by row of params (n, n_p); rows where nothing is are left out."""
+
+def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> dict[int, str]:
+    """What is wrong with numbers of compliant contacts, by row; rows where nothing is are left out.
+
+    t        of the starts, s
+    starts   (n, n_x) or (1, n_x), params: (n, n_p) or (1, n_p), inputs: (n, n_in) or (1, n_in)
+    """
     place = {name: k for k, name in enumerate(module.metadata.parameters)}
     found: dict[int, dict[str, None]] = {}
+    values = _values(module, t, starts, params, inputs) if NUMBERS in module.metadata.functions else np.zeros((1, 0))
+    seen = 0
     for contact in module.metadata.compliant:
-        for what, name, least, reached in contact.least:
-            if name not in place:  # it has become a number, which was checked
+        for what, name, least, reached, below in contact.ranges:
+            if not name:
+                column, seen = values[:, seen], seen + 1
+            elif name in place:
+                column = params[:, place[name]]
+            else:  # it has become a number, which was checked
                 continue
-            values = params[:, place[name]]
-            for row in np.flatnonzero(~(values >= least if reached else values > least)).tolist():
-                found.setdefault(row, {})[f"{what} of contact {contact.name} is {values[row]:g}; pass a number "
-                                          f"{'from' if reached else 'above'} {least:g}{' on' if reached else ''}"] = None
+            good = (column >= least if reached else column > least) & (column < below)
+            for row in np.flatnonzero(~good & np.isfinite(params).all(axis=1)).tolist():  # the others have a reason of their own
+                found.setdefault(row, {})[f"{what} of contact {contact.name} is {column[row]:g}; "
+                                          f"{range_text(least, reached, below)}"] = None
     return {row: f"{module.name}: {'; '.join(faults)}" for row, faults in found.items()}
 
 
-def check_compliance(module: Module, p: np.ndarray) -> None:
-    """Raise ArgumentError for numbers of compliant contacts that cannot be; p: (n_p,)."""
-    if module.metadata.compliant and (found := impossible(module, p[None, :])):
+def _values(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """What expressions of parameters are, (n, n_values); not a number where they cannot be evaluated."""
+    together = len(params) == 1
+    width = sum(not name for contact in module.metadata.compliant for _, name, *_ in contact.ranges)
+    found = np.full((max(len(starts), len(inputs)) if together else len(params), width), np.nan)
+    for k, p in enumerate(params):
+        rows = slice(None) if together else slice(k, k + 1)
+        x, given = (of if together or len(of) == 1 else of[rows] for of in (starts, inputs))
+        with contextlib.suppress(EvaluationError):
+            found[rows] = module.evaluate(NUMBERS, t, x, p, given).reshape(-1, width)
+    return found
+
+
+def check_compliance(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> None:
+    """Raise ArgumentError for numbers of compliant contacts that cannot be; x: (n_x,), p: (n_p,), inputs: (n_in,)."""
+    if module.metadata.compliant and (found := impossible(module, t, x[None, :], p[None, :], np.atleast_2d(inputs))):
         raise ArgumentError(found[0])

@@ -23,8 +23,8 @@ def slope(bristles: Any = None, tilt: float = TILT, **more: Any) -> sd.System:
     system.add_joint(sd.Prismatic("along", system.ground, slide, axis=[1, 0], coordinate=x))
     system.add_joint(sd.Prismatic("across", slide, block, axis=[0, 1], coordinate=y))
     law = {"stiffness": STIFFNESS, "exponent": 1, "dissipation": 10.0, "bristles": bristles, **more}
-    system.add_contact(sd.Contact("sole", block, system.ground, friction=(0.6, MU), law="compliant",
-                                  compliance=C.Compliance(**law)))
+    system.add_contact(sd.Contact("sole", block, system.ground, friction=(0.6, MU) if "stribeck" in more else MU,
+                                  law="compliant", compliance=C.Compliance(**law)))
     return system
 
 
@@ -68,6 +68,52 @@ def test_parameters_that_no_compliance_has_are_rejected_in_runs_and_fail_alone_i
     batch = module.simulate_batch(q={"y": 0.01}, params={"mu": [0.3, -0.1, 0.2]}, t=np.linspace(0, 0.1, 3))
     assert batch.success.tolist() == [True, False, True]
     assert "static friction of contact floor is -0.1" in batch.messages[1]
+
+
+def test_expressions_of_parameters_that_no_compliance_has_are_rejected_all_at_once() -> None:
+    base, wear, modulus, part, radius = sd.parameters("base wear modulus part radius")
+    system = sd.System("ball", gravity=[0, -G])
+    system.defaults = {base: 0.5, wear: 0.1, modulus: 2e4, part: 0.5, radius: 0.1}
+    ball = system.add_body("ball", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, ball, sd.coordinates("x y theta")))
+    brush = C.Bristles(1e5 * base, 300.0, part + 0.2)
+    system.add_contact(sd.Contact("floor", ball, system.ground, friction=(base, base - wear), law="compliant",
+                                  shape=C.Sphere(radius), compliance=C.Compliance(
+                                      modulus / 2, dissipation=1 - wear, stribeck=wear / 10, bristles=brush)))
+    module = system.compile()
+    assert module.simulate((0, 0.01), q={"y": 0.2}).success
+    wrong = {base: 0.5, wear: 2.0, modulus: -1.0, part: 0.8, radius: -0.1}
+    with pytest.raises(ArgumentError) as caught:
+        module.simulate((0, 0.01), q={"y": 0.2}, params=wrong)
+    for message in ("kinetic friction of contact floor is -1.5; pass a number above 0",
+                    "stiffness of contact floor is -0.5; pass a number above 0",
+                    "dissipation of contact floor is -1; pass a number from 0 on",
+                    "elastic part of bristles of contact floor is 1; pass a number from 0 to below 1",
+                    "radius of the shape on a of contact floor is -0.1; pass a number from 0 on"):
+        assert message in str(caught.value)
+    with pytest.raises(ArgumentError, match=r"static friction less kinetic friction of contact floor is -0\.1"):
+        module.simulate((0, 0.01), q={"y": 0.2}, params={wear: -0.1})
+    batch = module.simulate_batch(q={"y": [0.2, 0.3, 0.4]}, params={"modulus": [1e4, -1.0, 2e4]}, t=np.linspace(0, 0.01, 3))
+    assert batch.success.tolist() == [True, False, True] and "stiffness of contact floor is -0.5" in batch.messages[1]
+    with pytest.raises(ArgumentError, match=r"stiffness of contact floor is -0\.5"):
+        module.gradient(sd.Loss(end=sp.Symbol("y")), [modulus], (0, 0.01), q={"y": 0.2}, params={modulus: -1.0})
+
+
+def test_static_friction_without_a_curve_is_rejected_where_it_would_not_count() -> None:
+    mu = sd.parameters("mu")
+    for friction, stribeck, good in (((0.6, 0.5), None, False), ((mu, 0.5), None, False), ((0.6, 0.5), 0.1, True),
+                                     ((0.5, sp.Rational(1, 2)), None, True), ((mu, mu), None, True)):
+        system = sd.System("ball", gravity=[0, -G])
+        ball = system.add_body("ball", mass=1.0, inertia=0.1)
+        system.add_joint(sd.Planar("free", system.ground, ball, sd.coordinates("x y theta")))
+        system.add_contact(sd.Contact("floor", ball, "ground", friction=friction, law="compliant",
+                                      compliance=C.Compliance(1e4, stribeck=stribeck)))
+        if good:
+            system.check()
+            continue
+        with pytest.raises(ModelError, match=r"'floor': static friction is .* and kinetic friction 0\.5.*, and compliant "
+                                             r"contacts take static friction by Stribeck's curve; pass stribeck="):
+            system.check()
 
 
 @pytest.mark.parametrize(("law", "wrong"), [

@@ -97,6 +97,10 @@ class TreeQuantities(Motion):
         """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
         return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
 
+    def compliant_numbers(self) -> np.ndarray:
+        """Coefficients and lengths of compliant contacts that are expressions of parameters, one after the other."""
+        return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.numbers])
+
     def contact_points(self) -> np.ndarray:
         """Where every contact of bodies touches and the force on its body a, n-frame, rigid contacts first."""
         places = [(c.at, c.acting) for c in self.model.contacts if c.at] + [(c.at, c.acting) for c in self.model.compliant]
@@ -138,6 +142,8 @@ class TreeQuantities(Motion):
             own["weights"] = self.weights
         if self.model.compliant:
             own["compliant_contacts"] = self.compliant_contacts
+        if any(contact.numbers for contact in self.model.compliant):
+            own["compliant_numbers"] = self.compliant_numbers
         deep = any(contact.depth is not None for contact in self.model.compliant)
         if deep or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])

@@ -7,7 +7,8 @@ Source: Hunt and Crossley, Coefficient of restitution interpreted as damping in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +16,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
+from symdyn.real_numbers import range_text
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -52,8 +54,8 @@ class Compliance:
     exponent     a number from 1 on; 3/2: Hertz
     dissipation  s/m; about 3/2 (1 - e)/v for a restitution e near 1 at the speed v
     slip_speed   m/s: friction grows linearly with the slip up to about this speed, kinetic N slip/sqrt(slip^2 + slip_speed^2)
-    stribeck     m/s: friction falls from the static to the kinetic one over this speed, as exp(-(slip/stribeck)^2); None: kinetic
-                 friction only
+    stribeck     m/s: friction falls from the static to the kinetic one over this speed, as exp(-(slip/stribeck)^2); None: with
+                 one coefficient of friction only
     viscous      s/m: friction that grows with the slip, by the normal force
     bristles     friction by bristles in place of the slip alone, see Bristles
     depth        m: runs that go deeper report it; None: no limit
@@ -116,13 +118,14 @@ def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scal
     return sp.Rational(4, 3) / yielding / sp.sqrt(curved)
 
 
-class Least(NamedTuple):
-    """The least number that a parameter may be, what it is of a contact, and whether that number itself is one."""
+class Range(NamedTuple):
+    """The numbers that a value of a contact may have: from `least` on, which is one of them if `reached`, and below `below`."""
 
     what: str
-    parameter: str
-    least: float
-    reached: bool
+    value: Any
+    least: float = 0.0
+    reached: bool = True
+    below: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -174,49 +177,51 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
     return Law((normal, *forces), tuple(rates), kinks)
 
 
-def _least(given: Compliance) -> list[tuple[str, Any, float, bool]]:
-    """The numbers of a compliance, with the least that each may be, and whether that itself is one."""
-    found: list[tuple[str, Any, float, bool]] = [
-        ("stiffness", given.stiffness, 0.0, False), ("exponent", given.exponent, 1.0, True),
-        ("dissipation", given.dissipation, 0.0, True), ("slip_speed", given.slip_speed, 0.0, False),
-        ("viscous", given.viscous, 0.0, True)]
-    found += [("stribeck", given.stribeck, 0.0, False)] * (given.stribeck is not None)
-    found += [("depth", given.depth, 0.0, False)] * (given.depth is not None)
+def _ranges(given: Compliance) -> list[Range]:
+    """What the numbers of a compliance may be."""
+    found = [Range("stiffness", given.stiffness, reached=False), Range("exponent", given.exponent, 1.0),
+             Range("dissipation", given.dissipation), Range("slip_speed", given.slip_speed, reached=False),
+             Range("viscous", given.viscous)]
+    found += [Range(what, value, reached=False) for what, value in (("stribeck", given.stribeck), ("depth", given.depth))
+              if value is not None]
     if isinstance(given.bristles, Bristles):
-        found += [("stiffness of bristles", given.bristles.stiffness, 0.0, False),
-                  ("damping of bristles", given.bristles.damping, 0.0, True)]
+        found += [Range("stiffness of bristles", given.bristles.stiffness, reached=False),
+                  Range("damping of bristles", given.bristles.damping)]
+        if given.bristles.elastic is not None:
+            found.append(Range("elastic part of bristles", given.bristles.elastic, below=1.0))
     return found
 
 
-def least_of_parameters(given: Compliance, static: sp.Expr, kinetic: sp.Expr) -> tuple[Least, ...]:
-    """What parameters that are numbers of a compliant contact may be at least."""
-    friction = [("static friction", static, 0.0, True), ("kinetic friction", kinetic, 0.0, True)]
-    return tuple(Least(what, value.name, least, reached) for what, value, least, reached in [*friction, *_least(given)]
-                 if isinstance(value, sp.Symbol))
+def ranges_by_parameters(given: Compliance, static: sp.Expr, kinetic: sp.Expr,
+                         lengths: Mapping[str, sp.Expr]) -> tuple[Range, ...]:
+    """What the numbers of a compliant contact may be that follow from parameters; lengths: of its shapes."""
+    friction = [Range("static friction", static), Range("kinetic friction", kinetic, reached=given.bristles is None)]
+    if static != kinetic:
+        friction.append(Range("static friction less kinetic friction", static - kinetic))
+    found = [*friction, *_ranges(given), *[Range(what, length) for what, length in lengths.items()]]
+    return tuple(one for one in found if isinstance(one.value, sp.Basic) and not one.value.is_number)
 
 
-def compliance_faults(where: str, given: Any, numbers: Any, kinetic: Any) -> list[str]:
+def compliance_faults(where: str, given: Any, numbers: Any, static: sp.Expr, kinetic: sp.Expr) -> list[str]:
     """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
     found = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]
+    if given.stribeck is None and not (static - kinetic).is_zero:
+        found.append(f"{where}: static friction is {static} and kinetic friction {kinetic}, and compliant contacts take static "
+                     "friction by Stribeck's curve; pass stribeck=, m/s, to the compliance, or one coefficient of friction")
     if isinstance(given.depth, sp.Basic) and not given.depth.is_number:
         found.append(f"{where}: depth is {given.depth}; pass a number, in m")
     if isinstance(given.bristles, Bristles):
-        part = None if given.bristles.elastic is None else numbers(given.bristles.elastic)
-        if part is not None and not 0 <= part < 1:
-            found.append(f"{where}: elastic part of bristles is {part:g}; pass a number from 0 to below 1, or None for the LuGre "
-                         "model")
         if numbers(kinetic) == 0:
             found.append(f"{where}: bristles need friction; pass friction, or leave bristles out")
     elif given.bristles is not None:
         found.append(f"{where}: bristles is {shown(given.bristles)}; pass sd.contacts.Bristles(...), or None")
-    for what, value, least, reached in _least(given):
+    for what, value, least, reached, below in _ranges(given):
         wrong = Faults()
         wrong.expression(value, f"{where}: {what}")
         found += wrong
         number = None if wrong else numbers(value)
-        if number is not None and not (number >= least if reached else number > least):
-            found.append(f"{where}: {what} is {number:g}; pass a number {'from' if reached else 'above'} {least:g}"
-                         f"{' on' if reached else ''}")
+        if number is not None and not ((number >= least if reached else number > least) and number < below):
+            found.append(f"{where}: {what} is {number:g}; {range_text(least, reached, below)}")
     return found

@@ -105,7 +105,7 @@ class Contact:
         values |= self.lengths
         number = partial(value_of, defaults=defaults)
         if self.law == "compliant":
-            found += compliance_faults(self.where, self.compliance, number, self.kinetic)
+            found += compliance_faults(self.where, self.compliance, number, self.static, self.kinetic)
         numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
         found += range_faults(self.where, numbers)
         static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.contact_kinds import BODIES, FRICTION
-from symdyn.model.contacts.compliance import Compliance, Least, law_of, least_of_parameters
+from symdyn.model.contacts.compliance import Compliance, Range, law_of, ranges_by_parameters
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
 from symdyn.model.contacts.group import lowered
@@ -94,7 +94,7 @@ class RigidContact:
 @dataclass(frozen=True)
 class CompliantContact:
     """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, and the depth
-    that is reported, m; where it touches and the force on body a, n-frame; the least numbers that its parameters may be."""
+    that is reported, m; where it touches and the force on body a, n-frame; what numbers that follow from parameters may be."""
 
     name: str
     gap: sp.Expr
@@ -104,12 +104,17 @@ class CompliantContact:
     depth: float | None
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
-    least: tuple[Least, ...] = ()
+    ranges: tuple[Range, ...] = ()
 
     @property
     def expressions(self) -> list[sp.Expr]:
         """What it shows along a motion: gap, slip speed, forces, slips."""
         return [self.gap, self.slip_speed, *self.forces, *self.rows[1:]]
+
+    @property
+    def numbers(self) -> list[sp.Expr]:
+        """The values of its ranges that are no parameters but expressions of these."""
+        return [one.value for one in self.ranges if not one.value.is_Symbol]
 
 
 def contact_force(name: str, row: int, unit: str = "N") -> Quantity:
@@ -227,7 +232,8 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
                                                       geometry.place(touch), _along(directions, law.forces),
-                                                      least_of_parameters(compliance, contact.static, contact.kinetic)))
+                                                      ranges_by_parameters(compliance, contact.static, contact.kinetic,
+                                                                           contact.lengths)))
     _act(system, geometry, touch, directions, law.forces)
     if compliance.located:
         stays = next(q for joint in system.joints for q in joint.coordinates if isinstance(q, Coordinate))

@@ -20,17 +20,17 @@ def projects(module: Module) -> bool:
     return bool(names(module) or module.metadata.unit_groups)
 
 
-def consistent_starts(module: Module, t: float, starts: np.ndarray, params: np.ndarray,
+def consistent_starts(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray,
                       n: int) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
     """Starts with unit vectors of length 1, lengths that residuals are measured by, and of motions that cannot begin why.
 
     t        of the starts, s
     starts   (n, n_x), or (1, n_x) where nothing varies; returned as NaN where a motion cannot begin
-    params   (n, n_p) or (1, n_p)
+    params   (n, n_p) or (1, n_p); inputs: at the start, (n, n_in) or (1, n_in)
     n        motions
     The lengths, m, are (n, 1) or (1, 1).
     """
-    astray = impossible(module, params)
+    astray = impossible(module, t, starts, params, inputs)
     if not projects(module) and not astray:
         return starts, np.ones((1, 1)), {}
     lengths = np.ones((len(params), 1))

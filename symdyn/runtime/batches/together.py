@@ -56,7 +56,8 @@ class Together:
         self.states = np.full((n, 2, n_x), np.nan)
         self.span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
         self.params, self.wrong = _real(module, asked)
-        self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params, n)
+        self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params,
+                                                              asked.inputs, n)
         self.wrong |= astray
         self.begun = clock.perf_counter()
 
