@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.runtime.complementarity import lemke
+from symdyn.runtime.shared_forces import DEPENDENT, MARGIN, Cone, shared_forces
 
 OPEN, STICKING, SLIDING = "open", "sticking", "sliding"
 # Inequalities hold to this part of the sizes of what stands in them.
@@ -32,8 +33,6 @@ MOST_COMBINATIONS, MOST_TRIED, MOST_TRIED_IN_SPACE, AT_ONCE = 1024, 20_000, 100,
 STEPS, SMALL_ANGLE = 20, 1e-7
 # Accelerations that differ by more than this part of their size are different solutions.
 DIFFERENT = 1e-6
-# Singular values below this part of the largest: rows that depend on each other.
-DEPENDENT = 1e-10
 # A tangent that is left this part of its mobility where other rows hold does not move.
 KEPT = 1e-9
 # Directions that are tried first where a contact in space begins to slide.
@@ -96,12 +95,15 @@ class Mode:
 @dataclass(frozen=True)
 class Solved:
     """A solution: the mode of each contact, forces lam (n,) and what comes of them, w (n,); shared: whether the rows that hold
-    depend on each other, so that lam is the one of least norm."""
+    depend on each other, so that lam is the one of least norm, or that of a softness of the rows, (n,), see shared_forces; loose:
+    whether no softness gives lam."""
 
     modes: tuple[Mode, ...]
     lam: np.ndarray
     w: np.ndarray
     shared: bool
+    softness: np.ndarray | None = None
+    loose: bool = False
 
 
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
@@ -383,6 +385,30 @@ class _Table:
                 result[:, place] |= sliding & (along < -NOISE * size)
         return result
 
+    def shared_out(self, lam: np.ndarray, w: np.ndarray, least: bool = True) -> Solved | None:
+        """The solution of the only combination, whose rows depend on each other, where contacts stick in space; None where there
+        is none. lam: its forces of least norm, taken where they are within all cones if `least`; w: its accelerations."""
+        only = np.zeros((1, len(self.sites)), dtype=int)
+        modes = tuple(o[0] for o in self.options)
+        if not any(mode.kind == STICKING and len(site.tangents) == 2 for site, mode in zip(self.sites, modes, strict=True)):
+            return None
+        if least and not self.broken(only, lam[None], w[None]).any():
+            return Solved(modes, lam, w, True)
+        active = np.flatnonzero(np.any([of[0] for of in self.active], axis=0))
+        H, fixed = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.fixed))
+        cones, rows_of = [], np.zeros(len(lam))
+        for site, mode in zip(self.sites, modes, strict=True):
+            rows_of[list(site.rows)] = float(np.diag(self.D)[list(site.rows)].sum())
+            if mode.held and mode.kind == STICKING and site.tangents:
+                cones.append(Cone(site.normal, tuple(site.tangents), site.static))
+            elif mode.held and site.normal is not None:
+                cones.append(Cone(site.normal, (), 1.0))
+        right = -(self.b + self.D @ fixed)[active]
+        found = shared_forces((self.D @ H)[np.ix_(active, active)], right, H[:, active], fixed, rows_of[active], cones)
+        if found.margin <= MARGIN or self.broken(only, found.lam[None], w[None]).any():
+            return None
+        return Solved(modes, found.lam, w, True, found.softness, found.softness is None)
+
     def solved(self, combinations: Sequence[Sequence[int]]) -> list[Solved | None]:
         """The solution of each combination; None where it breaks an inequality."""
         found: list[Solved | None] = []
@@ -428,6 +454,12 @@ def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
     """Solutions that Lemke's method comes to from different covering vectors; in space the first, for the round cone."""
     stream = np.random.default_rng(0)
     planar, found = all(len(site.tangents) < 2 for site in sites), list[Solved]()
+    still = [next((mode for mode in _options(site) if mode.held), None) for site in sites]
+    if not planar and all(mode is not None and (mode.kind == STICKING or site.slip is not None or not site.tangents)
+                          for mode, site in zip(still, sites, strict=True)):
+        one = held(D, b, sites, [mode for mode in still if mode is not None])
+        if one is not None:
+            return [one]
     for k in range(COVERS):
         if found and not planar:
             break
@@ -545,6 +577,9 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
         broken = table.broken(only, lam, w)[0]
         if exact[0] and not broken.any():
             return Solved(directed, lam[0], w[0], bool(shared[0]))
+        fitting = table.shared_out(lam[0], w[0]) if exact[0] and shared[0] else None
+        if fitting is not None:
+            return fitting
         if exact[0] and shared[0] and not unknown and not table.broken(only, forces[None, :], w).any() and np.abs(
                 b + D @ forces - w[0]).max() <= NOISE * table.size:
             return Solved(directed, forces, w[0], True)
@@ -555,6 +590,14 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
         modes = [_other(site, mode, lam[0], w[0]) if bad else mode
                  for site, mode, bad in zip(sites, directed, broken, strict=True)]
     return None
+
+
+def held(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], least: bool = True) -> Solved | None:
+    """The solution with these modes, whose rows depend on each other, with forces that are within all cones of friction, of least
+    norm if these are and `least`; None where there is none."""
+    table, only = _Table(D, b, sites, [[m] for m in modes]), np.zeros((1, len(sites)), dtype=int)
+    lam, w, exact, shared = table.linear(only)
+    return table.shared_out(lam[0], w[0], least) if exact[0] and shared[0] else None
 
 
 def _other(site: Site, mode: Mode, lam: np.ndarray, w: np.ndarray) -> Mode:

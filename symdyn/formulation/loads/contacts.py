@@ -67,6 +67,7 @@ class ContactRows:
             fixed = zeros(n)
             reasons: list[str] = []
             sizes: list[Any] = []  # of the rows of each contact, of which some may not move: a tangent across a joint
+            softness: list[Any] = []
             first = 0
             for c in self.contacts:
                 rows = range(first, first + len(c.rows))
@@ -81,12 +82,13 @@ class ContactRows:
                 reasons += [f"contact {c.name}: {jams}its normal has no direction: points at one place, a disc that lies flat, a "
                             "curve that ends" if c.normal else f"contact {c.name}: nothing moves along it"] * len(rows)
                 sizes += [sum((self.D[k, k] for k in rows), 0)] * len(rows)
+                softness += [1 / (1 + a.expression(s) * a.expression(s)) for s in c.shares] or [1] * len(rows)
                 first += len(rows)
             A, shared = self.D @ H, a.expression(SOFTNESS)
             for i in range(n):
                 A[i] = held[i] * A[i]
                 A[i, i] = A[i, i] + (1 - held[i])
-            softened = A + np.diag([shared * held[i] * sizes[i] for i in range(n)])
+            softened = A + np.diag([shared * held[i] * sizes[i] * softness[i] for i in range(n)])
             least = [a.rounding * held[i] * sizes[i] for i in range(n)]
             factors = _Factors(a, softened, least, reasons)
             b = vector(*[-h * f for h, f in zip(held, self.free + self.D @ fixed, strict=True)])

@@ -81,6 +81,12 @@ class RigidContact:
         return self.kind != FRICTION
 
     @property
+    def shares(self) -> list[sp.Symbol]:
+        """Of a contact in space the parameters p that say how soft its rows are while it sticks and shares forces, 1/(1 + p^2):
+        those of the direction of its slip, which it has none of then."""
+        return [self.sliding[1], self.sliding[0], self.sliding[0]] if len(self.sliding) == 2 else []
+
+    @property
     def expressions(self) -> list[sp.Expr]:
         """All that a motion evaluates."""
         return [self.gap, *self.rows, *self.slide, *self.switches, *self.sliding]

@@ -21,7 +21,7 @@ import numpy as np
 from symdyn.backend.metadata import ContactRecord, ModuleMetadata
 from symdyn.contact_kinds import BODIES, CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Solved, degenerate, held, impact, solutions
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
@@ -331,7 +331,7 @@ class _Phases:
     doubts: dict[str, _Doubt] = field(default_factory=dict)  # by kind
     keeps: bool = False  # whether switches are kept for a way back
     crossed: list[Switch] = field(default_factory=list)
-    made: list[Made] = field(default_factory=list)  # at the latest switch
+    made: list[Made] = field(default_factory=list)  # at the latest switch; none where it changes no more than shares of forces
     quick: Motion | None = None
 
     def __post_init__(self) -> None:
@@ -351,6 +351,7 @@ class _Phases:
         self.most_kinetic: float | None = None  # energy, once it was looked at
         self.evaluators: dict[str, tuple[tuple[str, bytes], Any]] = {}
         self.shared = False
+        self.softness = [(0.0, 0.0)] * n  # of rows that share forces, as parameters: along the tangents, and the normal
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
         self.at_once, self.latest = 0, ""  # switches without time between, and the contacts of the latest
@@ -687,13 +688,14 @@ class _Phases:
     def _parameters(self) -> np.ndarray:
         """The parameters with the modes of all contacts."""
         p = self.request.p.copy()
-        for record, mode, direction in zip(self.records, self.modes, self.directions, strict=True):
+        for record, mode, direction, soft in zip(self.records, self.modes, self.directions, self.softness, strict=True):
             if record.closed:
                 p[self.place[record.closed]] = mode != OPEN
             if record.sticking:
                 p[self.place[record.sticking]] = mode == STICKING
-                for name, value in zip(record.sliding, direction, strict=True):
-                    p[self.place[name]] = value if mode == SLIDING else 0.0
+                given = direction if mode == SLIDING else soft if self.shared and mode == STICKING else (0.0, 0.0)
+                for name, value in zip(record.sliding, given, strict=False):
+                    p[self.place[name]] = value
         p[self.place[SHARED]] = SOFTNESS if self.shared else 0.0
         return self._held(p) if self.begins.directions and HOLDING in self.place else p
 
@@ -723,6 +725,8 @@ class _Phases:
             return self._switch(t, x, fired, start)
         p, n, self.ends = self._parameters(), self.request.n_state, SlipEnds()
         after = self._switch(t, x, fired, start)
+        if not self.made:  # forces are shared in another way, and the motion goes on
+            return after
         if start:  # changes of the start keep contacts that are closed there on their surfaces
             self.made.append(Made(tuple(self.modes), tuple(self.still)))
         since = t - self.latest_time if self.phases else self.request.span[1] - t
@@ -793,6 +797,14 @@ class _Phases:
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
         x = x.copy()
+        if fired and all(what in ("opens", "slips") for _, what in fired) and self._share_in_space([k for k, _ in fired]):
+            if self._shares_again(t, x):
+                self.made = []
+                return x
+            if self.request.columns or self.keeps:
+                raise _Stop(f"contacts {', '.join(self.records[k].name for k, _ in fired)} share forces and leave their cones of "
+                            "friction; how the time at which that happens changes is not known, so that derivatives are not "
+                            "computed across it; end the motion before, or take them by differences of two motions")
         turned = {k for k, what in fired if what in (IGNORED, COUNTS)}  # where what they are ignored by is at its zero
         self._pass_by(t, x, self._ignored(t, x) if start else [one != (k in turned) for k, one in enumerate(self.passed)])
         for k, what in fired:
@@ -985,6 +997,38 @@ class _Phases:
                               bounded=not self.records[k].normal))
         return sites
 
+    def _share_in_space(self, of: Sequence[int]) -> bool:
+        """Whether contacts are some that stick in space and share forces."""
+        return self.shared and all(self.modes[k] == STICKING and self.records[k].tangents == 2 for k in of)
+
+    def _shares_again(self, t: float, x: np.ndarray) -> bool:
+        """Whether contacts in space that stick and share forces hold by other shares than those with which some have left their
+        cones; these are taken then."""
+        at, closed = self._numbers(t, x), [k for k, mode in enumerate(self.modes) if mode != OPEN]
+        places = [row for k in closed for row in self.rows[k]]
+        modes = [Mode(self.modes[k], self.directions[k], True, self.still[k] and self.modes[k] == SLIDING) for k in closed]
+        sites = self._sites(at, closed)
+        one = held(at.D[np.ix_(places, places)], at.free[places], sites, modes, least=False)
+        if one is None:
+            return False
+        self._share(t, closed, one)
+        return True
+
+    def _share(self, t: float, closed: Sequence[int], one: Solved) -> None:
+        """Take the shares of forces of a solution; raise _Stop where generated code does not give them."""
+        self.softness = [(0.0, 0.0)] * len(self.records)
+        if one.loose:
+            names = ", ".join(self.records[k].name for k in closed)
+            raise _Stop(f"contacts {names} stick and share forces; some of these leave their cones of friction, though others "
+                        "hold, and at which load the contacts begin to slip is not decided where they are in different planes; "
+                        "fewer contacts, compliant ones, or method='moreau' decide it")
+        first = 0
+        for k in closed:
+            if one.softness is not None and self.modes[k] == STICKING and self.records[k].tangents == 2:
+                normal, along = one.softness[first:first + 2].tolist()
+                self.softness[k] = (1 / along - 1) ** 0.5, (1 / normal - 1) ** 0.5
+            first += self.records[k].rows
+
     def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> None:
         """The modes of the contacts that are closed, from the accelerations; the others are open."""
         places = [row for k in closed for row in self.rows[k]]
@@ -1016,6 +1060,8 @@ class _Phases:
             if self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0 and not mode.kept:
                 begins[k] = self.directions[k]
             self.still[k] = mode.kept or mode.kind == STICKING
+        if found:
+            self._share(t, closed, found[0])
         self.begins.switched(t, begins, {k: record.tangents == 2 for k, record in enumerate(self.records)
                                          if self.modes[k] == SLIDING})
 
@@ -1040,6 +1086,9 @@ class _Phases:
         """The end of a part of a phase that ends where slips have begun: the state, where directions of friction were held with
         slips along these; contacts that stick again before their slip was looked at."""
         held, p = self.begins.directions, self._parameters()
+        left = self._outside(t, x, p) if self.shared and not held else []
+        if left:
+            return x, left
         self.begins.directions = {}
         if held:
             slip = self._numbers(t, x).slip
@@ -1056,6 +1105,16 @@ class _Phases:
                 rates[k] = turning(at, self.tangents[k])
             self.begins.settled(t, rates)
         return x, []
+
+    def _outside(self, t: float, x: np.ndarray, p: np.ndarray) -> list[tuple[int, str]]:
+        """Contacts in space that share forces and have left their cones where nothing looked at these."""
+        force, found = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], p)).force, []
+        for k, mode in enumerate(self.modes):
+            if mode == STICKING and self.records[k].tangents == 2:
+                bound = float(self._numbers(t, x).static[k]) * float(force[self.normal[k]])
+                if bound < float(np.linalg.norm(force[self.tangents[k]])):
+                    found.append((k, "slips"))
+        return found
 
     def _realigned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray], before: np.ndarray, after: np.ndarray,
                    zero: float | None) -> np.ndarray:

@@ -1,0 +1,230 @@
+"""How contacts that stick share forces which the motion does not determine: a box on four corners, a table on legs.
+
+Accelerations determine the forces lam of contacts up to a null space. Contacts hold as long as some forces of that space are
+within all cones of friction. Those with the largest margin s are a second-order cone program,
+
+    maximize s  with  |lam_T| + s f <= mu lam_N  in every contact that sticks, lam_N >= s f in the others,
+
+which is solved by a barrier, with sizes f that are mu lam_N of a first solution: s is a part of the friction. Generated code
+softens rows that depend on each other, so that its forces are those of the least sum of squares, each by the softness of its row.
+The barrier gives the softness for which these are the forces of the largest margin: at its minimum the sum of
+(mu a dN - lam_T dT)/(a^2 - |lam_T|^2), a = mu lam_N - s f, vanishes for all changes in the null space. That holds where changes
+of normal and of tangential forces are independent, as with all contacts in one plane.
+
+Source: Boyd and Vandenberghe, Convex Optimization, 2004, sections 11.2 and 11.6 (barriers of second-order cones).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+# Singular values below this part of the largest: rows that depend on each other.
+DEPENDENT = 1e-10
+# The margin by the bounds, above which contacts hold; steps of Newton's method that are rounding.
+MARGIN, EXACT = 1e-11, 1e-12
+# A margin above this part that softness does not come to: how contacts share forces is not decided.
+MISSED = 1e-5
+# The least softness by the largest one.
+LEAST = 1e-4
+# By how much the barrier is lowered at once, and how far; the steps of Newton's method for it, and the square of its decrement
+# from which on full steps converge.
+LOWERED, LAST, STEPS, NEAR = 20.0, 1e6, 50, 0.05
+# The part of the margin from which on it is of a cone; solutions, each with the sizes of the one before; the least size.
+WORTH, ROUNDS, SMALLEST = 1e-3, 3, 1e-9
+# The largest sum of normal forces by the sum of those of least norm, where a prestress leaves it open.
+PRESTRESS = 10.0
+
+
+_Part = tuple[np.ndarray, np.ndarray]
+
+
+class Cone(NamedTuple):
+    """Bounds of one contact: rows of its normal force, None where it has none, and of its tangential ones, empty where these are
+    no unknowns; friction: coefficient of the normal force, without one the bound itself."""
+
+    normal: int | None
+    tangents: tuple[int, ...]
+    friction: float
+
+
+class Shared(NamedTuple):
+    """Forces lam (n,) with their margin, the least part that is left of a bound; softness (n,) of rows for which generated code
+    gives these, from 0 to 1. None: it gives others, which are not within all cones."""
+
+    lam: np.ndarray
+    margin: float
+    softness: np.ndarray | None
+
+
+class _Null(NamedTuple):
+    """Forces lam = lam_0 + N y that fulfil what the accelerations determine."""
+
+    lam_0: np.ndarray
+    N: np.ndarray
+
+
+def shared_forces(A: np.ndarray, right: np.ndarray, H: np.ndarray, fixed: np.ndarray, sizes: np.ndarray,
+                  cones: Sequence[Cone]) -> Shared:
+    """The forces lam = H x + fixed with A x = right that leave the largest margin to all cones.
+
+    A         (m, m), dependent rows; right (m,), H (n, m), fixed (n,)
+    sizes     of the rows of A, (m,), by which softness is measured
+    """
+    U, s, V = np.linalg.svd(A)
+    kept = s > DEPENDENT * s[:1]
+    x_0 = V[kept].T @ ((U[:, kept].T @ right) / s[kept])
+    null, left = V[~kept].T, U[:, ~kept]
+    lam_0 = H @ x_0 + fixed
+    inside = H @ null
+    force = max(float(np.abs(lam_0).max(initial=0.0)), 1e-300)
+    sizes_of = np.ones(len(cones))
+    for _ in range(ROUNDS):
+        y, margin, rows = _largest_margin(_Null(lam_0 / force, inside), cones, sizes_of)
+        sizes_of = np.maximum([_bound(lam_0 / force + inside @ y, cone) for cone in cones], SMALLEST)
+    lam = lam_0 + force * (inside @ y)
+    places = np.argmax(np.abs(H) == 1, axis=0)  # of the unknowns among the rows
+    rows[places] = rows[places] / np.maximum(sizes, 1e-300)
+    softness = _by_parts(rows, H @ null)
+    E = sizes * softness[places]
+    along = np.linalg.lstsq(left.T @ (E[:, None] * null), -left.T @ (E * x_0), rcond=None)[0]
+    given = H @ (x_0 + null @ along) + fixed
+    reached = _margin(given / force, cones)
+    if reached > MARGIN:
+        return Shared(given, reached, softness)
+    return Shared(lam, margin, None) if margin > MISSED else Shared(lam, min(margin, reached), softness)
+
+
+def _margin(lam: np.ndarray, cones: Sequence[Cone]) -> float:
+    """The least part of a bound that forces leave."""
+    bounds = [_bound(lam, cone) for cone in cones]
+    left = [bound - float(np.linalg.norm(lam[list(cone.tangents)])) for bound, cone in zip(bounds, cones, strict=True)]
+    return min((one / max(abs(bound), SMALLEST) for one, bound in zip(left, bounds, strict=True)), default=np.inf)
+
+
+def _bound(lam: np.ndarray, cone: Cone) -> float:
+    return cone.friction if cone.normal is None else cone.friction * float(lam[cone.normal])
+
+
+def _by_parts(softness: np.ndarray, N: np.ndarray) -> np.ndarray:
+    """Softness from LEAST to 1 in every part of the rows whose forces change together."""
+    found, together = np.ones(len(softness)), np.abs(N @ N.T) > DEPENDENT
+    left = set(range(len(softness)))
+    while left:
+        part, new = set[int](), {min(left)}
+        while new:
+            part |= new
+            new = {int(j) for k in new for j in np.flatnonzero(together[k])} - part
+        left -= part
+        rows = sorted(part)
+        found[rows] = np.clip(softness[rows] / max(float(softness[rows].max()), 1e-300), LEAST, 1.0)
+    return found
+
+
+def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """y and s of the largest margin by sizes f, and the softness of all rows."""
+    n, normals = null.N.shape[1], [cone.normal for cone in cones if cone.normal is not None]
+    # Of each cone u = [mu lam_N - s f; lam_T] = u_0 + W v.
+    parts: list[_Part] = []
+    for cone, size in zip(cones, sizes.tolist(), strict=True):
+        rows = list(cone.tangents)
+        W = np.zeros((1 + len(rows), n + 1))
+        if cone.normal is not None:
+            W[0, :n] = cone.friction * null.N[cone.normal]
+        W[0, n], W[1:, :n] = -size, null.N[rows]
+        parts.append((np.append(_bound(null.lam_0, cone), null.lam_0[rows]), W))
+    # A prestress may raise normal forces, up to a bound.
+    most = PRESTRESS * float(np.abs(null.lam_0).sum())
+    parts.append((np.array([most - null.lam_0[normals].sum()]), np.append(-null.N[normals].sum(axis=0), 0.0)[None, :]))
+    v = np.append(np.zeros(n), min((float(u[0]) - float(np.linalg.norm(u[1:]))) / size
+                                   for (u, _), size in zip(parts, sizes.tolist(), strict=False)) - 1.0)
+    weight = 1.0
+    while weight < LAST:
+        weight = min(LAST, weight * LOWERED)
+        v = _centred(parts, v, weight)
+    # Of each cone the part of the margin that it is worth, and this by the tangential force: softness, up to a factor.
+    u = [u_0 + W @ v for u_0, W in parts]
+    worth = np.array([2 * one[0] / (weight * (one[0]**2 - one[1:] @ one[1:])) for one in u])
+    by_force = worth / np.array([one[0] for one in u])
+    share = worth[:len(cones)] * sizes
+    active = np.flatnonzero(share > WORTH * share.max())
+    polished = _polished(parts, v, worth, active)
+    if polished is not None:
+        v, worth[active] = polished
+        sizes = np.array([np.linalg.norm((u_0 + W @ v)[1:]) for u_0, W in parts])
+        by_force[active] = worth[active] / np.maximum(sizes[active], 1e-300)
+    softness, lam = np.ones(len(null.lam_0)), null.lam_0 + null.N @ v[:n]
+    for k, cone in enumerate(cones):
+        softness[list(cone.tangents)] = by_force[k]
+        if cone.normal is not None:
+            softness[cone.normal] = cone.friction * worth[k] / max(float(lam[cone.normal]), 1e-300)
+    return v[:n], float(v[n]), softness
+
+
+def _polished(parts: Sequence[_Part], v: np.ndarray, worth: np.ndarray,
+              active: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """The largest margin to rounding, by Newton's method for the conditions of optimality of the cones that it is of, with what
+    each is worth; None where it comes to another set of cones."""
+    n, m = len(v), len(active)
+    found, w = v.copy(), worth[active]
+    for _ in range(STEPS):
+        F, J = np.zeros(n + m), np.zeros((n + m, n + m))
+        F[n - 1] = 1.0
+        for j, k in enumerate(active.tolist()):
+            u_0, W = parts[k]
+            u = u_0 + W @ found
+            size = float(np.linalg.norm(u[1:]))
+            slope = W[0].copy()
+            if size > 0:
+                unit = u[1:] / size
+                slope -= unit @ W[1:]
+                J[:n, :n] -= w[j] / size * (W[1:].T @ (np.eye(len(unit)) - np.outer(unit, unit)) @ W[1:])
+            F[:n] += w[j] * slope
+            F[n + j] = u[0] - size
+            J[:n, n + j], J[n + j, :n] = slope, slope
+        step = np.linalg.lstsq(J, -F, rcond=DEPENDENT)[0]
+        found, w = found + step[:n], w + step[n:]
+        if float(np.abs(step).max()) <= EXACT:
+            left = [float(u[0]) - float(np.linalg.norm(u[1:])) for u in (u_0 + W @ found for u_0, W in parts)]
+            return (found, w) if (w >= 0).all() and min(left) >= -EXACT else None
+    return None
+
+
+def _centred(parts: Sequence[_Part], v: np.ndarray, weight: float) -> np.ndarray:
+    """The minimum of -weight s - sum of log(u_0^2 - |u_T|^2), by Newton's method from a point inside."""
+    def value(v: np.ndarray) -> float:
+        total = -weight * float(v[-1])
+        for u_0, W in parts:
+            u = u_0 + W @ v
+            square = float(u[0]**2 - u[1:] @ u[1:])
+            if u[0] <= 0 or square <= 0:
+                return np.inf
+            total -= float(np.log(square))
+        return total
+
+    last = np.inf
+    for _ in range(STEPS):
+        gradient, H = np.zeros(len(v)), np.zeros((len(v), len(v)))
+        gradient[-1] = -weight
+        for u_0, W in parts:
+            u = u_0 + W @ v
+            turned = np.append(u[0], -u[1:])
+            square = float(turned @ u)
+            of = W.T @ turned
+            gradient -= 2 / square * of
+            signs = np.append(1.0, -np.ones(len(u) - 1))
+            H += 4 / square**2 * np.outer(of, of) - 2 / square * (W.T @ (signs[:, None] * W))
+        step = np.linalg.lstsq(H, -gradient, rcond=None)[0]
+        falls = float(-gradient @ step)
+        if falls < NEAR:  # where full steps are known to converge; values are rounding there
+            if not 0 < falls < last / 2 or value(v + step) == np.inf:
+                break
+            v, last = v + step, falls
+            continue
+        part, now = 1.0, value(v)
+        while value(v + part * step) > now - 0.1 * part * falls and part > 1e-10:
+            part /= 2
+        v = v + part * step
+    return v
