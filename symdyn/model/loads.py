@@ -72,6 +72,8 @@ class ForceBetween:
     """A force (N) along the line from a point of one body to a point of another; positive where it draws them together.
 
     points (3, 1) in the axes of their bodies
+    span   the distance of the points, m, with a value above 0 where they coincide; None: it is computed, and the force has no
+           direction there
     """
 
     body_a: Any
@@ -80,6 +82,7 @@ class ForceBetween:
     point_a: sp.ImmutableMatrix
     point_b: sp.ImmutableMatrix
     label: str
+    span: sp.Expr | None = None
 
 
 def expressions_of(load: Any) -> tuple[sp.Expr, ...]:
@@ -92,4 +95,6 @@ def expressions_of(load: Any) -> tuple[sp.Expr, ...]:
         return load.values
     if isinstance(load, SpringDamper):
         return load.stiffness, load.damping, load.length
-    return (load.force,) if isinstance(load, ForceBetween) else ()
+    if isinstance(load, ForceBetween):
+        return (load.force,) if load.span is None else (load.force, load.span)
+    return ()

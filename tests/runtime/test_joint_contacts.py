@@ -106,6 +106,29 @@ def test_backlash_passes_impacts_and_keeps_angular_momentum() -> None:
     assert min(lower.gap.min(), upper.gap.min()) > -1e-12
 
 
+@pytest.mark.parametrize("method", [None, "moreau"])
+def test_rope_whose_ends_start_at_one_point_becomes_taut(method: str | None) -> None:
+    """Two bodies fly apart until the rope jerks: the impulse (1 + e) v m_1 m_2/(m_1 + m_2) along it, v across it stays."""
+    masses, length, e = (1.0, 3.0), 2.0, 0.5
+    system = sd.System("pair", gravity=[0, 0])
+    for name, mass in zip("ab", masses, strict=True):
+        body = system.add_body(name, mass=mass, inertia=0.1)
+        system.add_joint(sd.Planar(f"free_{name}", system.ground, body, sd.coordinates(f"x_{name} y_{name} angle_{name}")))
+    system.add_contact(sd.Rope("rope", "a", "b", length=length, restitution=e))
+    start = np.array([1.0, 0.5, 0, -1.0, 0.2, 0])
+    apart = start[:2] - start[3:5]
+    speed = np.linalg.norm(apart)
+    more = {} if method is None else {"method": method, "step": 1e-3}
+    solution = system.compile().simulate((0, 1.5), u=start, **more)
+    rope, impulse = solution.contacts["rope"], (1 + e) * speed * masses[0] * masses[1] / sum(masses)
+    assert rope.impacts.t == pytest.approx([length / speed], abs=1e-12 if method is None else 1.1e-3)
+    assert rope.impacts.impulse[0, 0] == pytest.approx(impulse, rel=1e-12 if method is None else 1e-9)
+    after = start.copy()
+    after[:2] -= impulse / masses[0] * apart / speed
+    after[3:5] += impulse / masses[1] * apart / speed
+    assert solution.u[-1] == pytest.approx(after, abs=1e-11 if method is None else 1e-9)
+
+
 def test_rope_becomes_taut_and_leads_around() -> None:
     """A point flies straight on until the rope is taut; what is left of its speed is across, and the tension m v^2/L."""
     length, height, speed, mass = 2.0, 1.2, 3.0, 0.7
@@ -220,6 +243,7 @@ def test_faults_of_elements_are_reported_together() -> None:
                     sd.OneWayClutch("way", "a", direction=2), sd.JointFriction("weak", "a", breakaway=1.0, sliding=2.0),
                     sd.Stop("odd", "a", lower=0, impact="x"),
                     sd.JointFriction("negative", "a", breakaway=-1.0), sd.Rope("short", "ball", "ground", length=-1.0),
+                    sd.Rope("no_rope", "ball", "ground", length=0),
                     sd.Rope("same", "ball", "ball", length=1.0), sd.Rope("nobody", "ball", "bal", length=1.0)):
         system.add_contact(element)
     with pytest.raises(ModelError) as caught:
@@ -229,7 +253,8 @@ def test_faults_of_elements_are_reported_together() -> None:
                  "is at the joint 'knee', which the system does not have; joints: a, b, free", "a stop is named 'bad name'",
                  "restitution is 1.2; pass a number from 0 to 1", "width is -0.1; pass a number from 0 on",
                  "direction is 2; pass 1", "impact is 'x'",
-                 "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1", "is between ball and ball",
+                 "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1", "length is 0; pass a length above 0, or a joint",
+                 "is between ball and ball",
                  "is between ball and bal;"):
         assert part in message, part
 

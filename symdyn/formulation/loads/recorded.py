@@ -244,6 +244,9 @@ class Loads:
         tension = self.value(load.force)
         if not is_zero(tension):
             d, length, common = self._line(load)
+            if load.span is not None:
+                self._pull(result, load, d * (tension / self.value(load.span)), common)
+                return
             apply = self.algebra.recorder.apply
             # What pulls only is slack where its ends coincide, and has no direction there.
             slack = isinstance(tension, Node) and any(node.op in ("max", "min", "select") for node in reachable([tension]))

@@ -19,7 +19,7 @@ from symdyn.contact_kinds import CLUTCH, FRICTION, STOP
 from symdyn.model.contacts.coefficients import value_of
 from symdyn.model.faults import Faults
 from symdyn.model.loads import ForceBetween, JointForce
-from symdyn.model.quantity import distance
+from symdyn.model.quantity import component, distance
 from symdyn.model.symbols import Coordinate
 from symdyn.shown import name_of, shown
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 NEWTON = "newton"
 IMPACTS = (NEWTON, "poisson")
+# Ends of a rope nearer than this part of its length are at one place; its square is below rounding of the length.
+COINCIDE = sp.Rational(1, 10**9)
 
 
 @dataclass(frozen=True)
@@ -272,6 +274,7 @@ class Rope(JointElement):
         self.a, self.b, self.impact = a, b, impact
         self.points: Sequence[Any] = ((0, 0, 0) if point_a is None else point_a, (0, 0, 0) if point_b is None else point_b)
         self.at: list[sp.ImmutableMatrix] = []
+        self.span: sp.Expr = sp.S.One
         self.length = self._number(length, "length")
         self.restitution = self._number(restitution, "restitution", 0.0, 1.0)
 
@@ -287,10 +290,22 @@ class Rope(JointElement):
         at = self.at = [faults.vector(p, f"{self.where}: {what}", system.planar)
                         for p, what in zip(self.points, ("point_a", "point_b"), strict=True)]
         apart = distance(names[0], names[1], list(at[0]), list(at[1]))
-        return [Row(self.name, STOP, self.length - apart, -apart.dot, ())]
+        # The rate of the distance, with a length that is not zero where the ends coincide.
+        ends = [[component(name, list(p), "position", k) for k in range(2 if system.planar else 3)]
+                for name, p in zip(names, at, strict=True)]
+        between = [(a - b, a.dot - b.dot) for a, b in zip(*ends, strict=True)]
+        self.span = sp.sqrt(sp.Add(*[d**2 for d, _ in between]) + (COINCIDE * self.length)**2)
+        rate = sp.Add(*[d * v for d, v in between]) / self.span
+        return [Row(self.name, STOP, self.length - apart, -rate, ())]
+
+    def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
+        found = super().number_faults(defaults)
+        if value_of(self.length, defaults) == 0:
+            found.append(f"{self.where}: length is 0; pass a length above 0, or a joint where both points stay together")
+        return found
 
     def act(self, row: Row, force: sp.Expr) -> list[JointForce | ForceBetween]:
-        return [ForceBetween(self.a, self.b, force, self.at[0], self.at[1], self.where)]
+        return [ForceBetween(self.a, self.b, force, self.at[0], self.at[1], self.where, self.span)]
 
 
 def _signed(on: tuple[tuple[Any, sp.Expr], ...], sign: int) -> tuple[tuple[Any, sp.Expr], ...]:
