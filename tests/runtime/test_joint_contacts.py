@@ -253,8 +253,8 @@ def test_faults_of_elements_are_reported_together() -> None:
                  "is at the joint 'knee', which the system does not have; joints: a, b, free", "a stop is named 'bad name'",
                  "restitution is 1.2; pass a number from 0 to 1", "width is -0.1; pass a number from 0 on",
                  "direction is 2; pass 1", "impact is 'x'",
-                 "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1", "length is 0; pass a length above 0, or a joint",
-                 "is between ball and ball",
+                 "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1",
+                 "length is 0; pass a length above 0, or a joint", "is between ball and ball",
                  "is between ball and bal;"):
         assert part in message, part
 
@@ -300,3 +300,12 @@ def roped() -> sd.System:
     system.add_joint(sd.Prismatic("along", system.ground, ball, axis=[1, 0, 0], coordinate=sd.coordinates("x")))
     system.add_contact(sd.Rope("rope", ball, "ground", length=1.0))
     return system
+
+
+@pytest.mark.parametrize("element", [sd.Backlash("x", "a", "a", width=0.1), sd.OneWayClutch("x", "a", "a"),
+                                     sd.JointFriction("x", "a", 1.0, other="a")])
+def test_elements_between_a_joint_and_itself_are_faults(element: Any) -> None:
+    system = rotors(1.0)
+    system.add_contact(element)
+    with pytest.raises(ModelError, match="'x' is between the joint 'a' and itself; pass two different joints"):
+        system.check()

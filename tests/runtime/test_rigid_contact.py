@@ -17,6 +17,7 @@ from symdyn.errors import ArgumentError, EvaluationError, ModelError, Simulation
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Solved, impact, solutions
 from symdyn.runtime.integrating import contacts, hybrid
 
+X = sp.Symbol("x")
 G = 9.81
 
 
@@ -577,3 +578,31 @@ def test_contact_that_closes_unseen_stops_the_run() -> None:
             module.simulate((0, 1), q=[0.5])
     finally:
         contacts._Phases._looked_for = seen  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(("shape", "planar", "wrong"), [
+    ((sd.contacts.Sphere(0.1), sd.contacts.Cam(-1, X)), True, "radius of the Cam is -1 m at the angle 0.04363; pass one"),
+    ((sd.contacts.Point(), sd.contacts.Cam(sp.cos(X), X)), True, r"the radius of the Cam is -0\.0436194 m at the angle 1\.614"),
+    (sd.contacts.Box([0.4, 0]), True, "edge 2 of the box is 0; pass a length above 0"),
+    (sd.contacts.Disc(0), False, "radius of the shape on a is 0; pass a length above 0"),
+    ((sd.contacts.Point(), sd.contacts.Bore(0)), True, "radius of the shape on b is 0; pass a length above 0"),
+    ((sd.contacts.Sphere(0.5), sd.contacts.Bore(0.3)), True, r"the Sphere on a does not fit into the Bore on b, which is 0.2 m"),
+    ((sd.contacts.Torus(0.3, 0.1), sd.contacts.Bore(0.35)), False, r"the Torus on a does not fit .* is 0\.05 m too small"),
+    ((sd.contacts.Cylinder(0.3, 0.8), sd.contacts.Bore(0.4)), False, r"the Cylinder on a does not fit .* is 0\.1 m too small"),
+    ((sd.contacts.Box([0.6, 0.8]), sd.contacts.Bore(0.4)), True, r"the Box on a does not fit .* is 0\.1 m too small")])
+def test_shapes_that_cannot_be_or_do_not_fit_are_faults(shape: Any, planar: bool, wrong: str) -> None:
+    system = sd.System("shaped")
+    body = system.add_body("body", mass=1.0, inertia=0.1 if planar else [0.1] * 3)
+    system.add_joint(sd.Planar("free", system.ground, body) if planar
+                     else sd.Free("free", system.ground, body, orientation=sd.EulerAngles("ZYX")))
+    system.add_contact(sd.Contact("touch", body, "ground", shape=shape))
+    with pytest.raises(ModelError, match=wrong):
+        system.check()
+
+
+def test_body_of_another_system_with_the_same_name_is_a_fault() -> None:
+    system = ball()
+    other = sd.System("other").add_body("ball", mass=1.0)
+    system.add_contact(sd.Contact("strange", other, "ground"))
+    with pytest.raises(ModelError, match=r"contact 'strange': 'ball' is a body of another system, and this one has another body"):
+        system.check()

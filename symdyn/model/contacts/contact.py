@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson", "stronge")
 ORIGIN_OF_A = Point()
+# Angles at which a cam is looked at.
+AROUND = 72
 ON_A, ON_B = (Point, Sphere, Disc, Torus, Cylinder, Box), (Plane, Sphere, Bore, Curve, Surface, Cam)
 
 
@@ -98,6 +101,23 @@ class Contact:
                     shape.size if isinstance(shape.size, (list, tuple)) else ())}
         return found
 
+    @property
+    def room(self) -> sp.Expr | None:
+        """How much smaller the shape on a is than the bore around it, m; None where there is no bore, or the shape is a point."""
+        a, number = self.on_a, Faults().expression
+        if not isinstance(self.on_b, Bore) or isinstance(a, Point):
+            return None
+        if isinstance(a, Box):
+            sizes = [number(e, "size") for e in (a.size if isinstance(a.size, (list, tuple)) else ())]
+            reach = sp.sqrt(sp.Add(*[e**2 for e in sizes])) / 2
+        else:
+            reach = number(a.radius, "radius")
+        if isinstance(a, Torus):
+            reach = reach + number(a.tube, "tube")
+        elif isinstance(a, Cylinder):
+            reach = sp.sqrt(reach**2 + (number(a.length, "length") / 2)**2)
+        return number(self.on_b.radius, "radius") - reach
+
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
         found = []
@@ -108,10 +128,32 @@ class Contact:
             found += compliance_faults(self.where, self.compliance, number, self.static, self.kinetic)
         numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
         found += range_faults(self.where, numbers)
+        found += [f"{self.where}: {what} is 0; pass a length above 0" for what in self.lengths
+                  if numbers.get(what) == 0 and not isinstance(self.on_b if what.endswith("b") else self.on_a, Sphere)
+                  and not what.startswith("tube")]
+        room = None if self.room is None else number(self.room)
+        if room is not None and room <= 0 and not found:
+            found.append(f"{self.where}: the {type(self.on_a).__name__} on a does not fit into the Bore on b, which is "
+                         f"{-room:g} m too small; pass a larger bore")
+        found += self._cam_faults(defaults)
         static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))
         if static is not None and kinetic is not None and kinetic > static >= 0:
             found.append(above(self.where, kinetic, static))
         return found
+
+    def _cam_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
+        """A cam whose radius is not positive all around, as far as it has numbers."""
+        cam = self.on_b
+        if not isinstance(cam, Cam) or not isinstance(cam.angle, sp.Symbol):
+            return []
+        name = cam.angle.name
+        for angle in (2 * math.pi * (k + 0.5) / AROUND for k in range(AROUND)):
+            spline = not isinstance(cam.radius, (sp.Basic, int, float)) and callable(cam.radius)
+            radius = float(cam.radius(angle)) if spline else value_of(cam.radius, {**defaults, name: angle})
+            if radius is not None and not radius > 0:
+                return [f"{self.where}: the radius of the Cam is {radius:g} m at the angle {angle:.4g}; pass one that is above 0 "
+                        "all around"]
+        return []
 
     def structure_faults(self, planar: bool) -> list[str]:
         """Shapes that do not fit each other or the plane."""

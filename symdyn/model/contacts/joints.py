@@ -110,6 +110,10 @@ class JointElement:
             return None
         if second is None:
             return first[1], first[1].dot, ((first[0], sp.S.One),)
+        if first[0] is second[0]:
+            faults.append(f"{self.where} is between the joint {shown(first[0].name)} and itself; pass two different joints, or "
+                          "leave the second one out")
+            return None
         return first[1] - ratio * second[1], first[1].dot - ratio * second[1].dot, ((first[0], sp.S.One), (second[0], -ratio))
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.contact_kinds import BODIES, FRICTION
+from symdyn.model.bodies import Body
 from symdyn.model.contacts.compliance import Compliance, Range, law_of, ranges_by_parameters
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
@@ -148,7 +149,7 @@ def with_contacts(system: System) -> System:
                 _add_row(result, contact, row)
             continue
         faults.extend([*contact.faults, *contact.structure_faults(system.planar), *contact.number_faults(system.defaults),
-                       *_body_faults(contact, known)])
+                       *_body_faults(contact, system, known)])
         if len(faults) == before:
             geometry = Geometry(contact, system.planar, system.ground_motion is None, faults)
             for touch in geometry.touches():
@@ -166,7 +167,12 @@ def with_contacts(system: System) -> System:
     return result
 
 
-def _body_faults(contact: Contact, known: set[str]) -> list[str]:
+def _body_faults(contact: Contact, system: System, known: set[str]) -> list[str]:
+    own = {body.name: body for body in system.bodies if isinstance(body.name, str)}
+    foreign = [body.name for body in (contact.a, contact.b) if isinstance(body, Body) and own.get(body.name, body) is not body]
+    if foreign:
+        return [f"{contact.where}: {' and '.join(map(shown, foreign))} is a body of another system, and this one has another "
+                "body of that name; pass that one, or its name"]
     a, b = (getattr(body, "name", body) for body in (contact.a, contact.b))
     names = [body if isinstance(body, str) else shown(body) for body in (a, b)]
     strange = [name for name in names if name not in known]
@@ -231,6 +237,7 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     """Loads of a compliant contact, and the states of its bristles."""
     compliance = contact.compliance
     assert isinstance(compliance, Compliance)  # checked before
+    lengths = contact.lengths if contact.room is None else {**contact.lengths, "room in the bore": contact.room}
     names = [f"{touch.name}_bristle"] if len(rows) == 2 else [f"{touch.name}_bristle_{axis}" for axis in "xy"]
     deflections = [Coordinate(name) for name in names[:len(rows) - 1]] if compliance.bristles is not None else []
     law = law_of(compliance, contact.static, contact.kinetic, touch.gap, rows, deflections, geometry.faults, contact.where)
@@ -239,7 +246,7 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
                                                       geometry.place(touch), _along(directions, law.forces),
                                                       ranges_by_parameters(compliance, contact.static, contact.kinetic,
-                                                                           contact.lengths)))
+                                                                           lengths)))
     _act(system, geometry, touch, directions, law.forces)
     if compliance.located:
         stays = next(q for joint in system.joints for q in joint.coordinates if isinstance(q, Coordinate))
