@@ -111,6 +111,7 @@ def particle_on_moving_slope(rocking: bool = False) -> System:
     system = System("particle_on_moving_slope", gravity=[0, -g])
     _particle(system, "particle", m, x, y)
     system.add_constraint(y * sp.cos(theta) - x * sp.sin(theta), name="slope")
+    system.draw(system.ground, shapes.Line([(0, 0)], 2.5, to=("particle", (0, 0))), color="0.45")  # the slope
     system.defaults = {m: 1.0, g: 9.81, omega: 2.0}
     system.units = {omega: "rad/s"}
     rate = 2.0  # of theta at the start
