@@ -71,8 +71,10 @@ def test_kept_results_belong_to_the_code(source: Path) -> None:
     codes = [hashlib.sha256(code.encode()).hexdigest()[:16] for code in cells]
     assert [cell["code"] for cell in kept] == codes, f"run python docs/extensions/tutorials.py {source.stem}"
     pictures = {output["image"] for cell in kept for output in cell["outputs"] if "image" in output}
-    assert pictures == {path.name for path in (FOLDER / "results").glob(f"{source.stem}_*.png")
-                        if path.stem.removeprefix(f"{source.stem}_").isdigit()}
+    assert pictures == {path.name for path in (FOLDER / "results").glob(f"{source.stem}_*.*")
+                        if path.suffix in (".png", ".gif") and path.stem.removeprefix(f"{source.stem}_").isdigit()}
+    texts = [output["text"] for cell in kept for output in cell["outputs"] if "text" in output]
+    assert not [text for text in texts if text.startswith(("<IPython", "System("))]
     views = {output["view"] for cell in kept for output in cell["outputs"] if "view" in output}
     assert views == {path.stem for path in (FOLDER / "results").glob(f"{source.stem}_view_*.json")}
 

@@ -22,8 +22,8 @@ from tests.helpers import CONTRAST, browser
 ROOT = Path(__file__).parents[1]
 # As wide as screens, with and without the contents of a page at its side, and as a telephone.
 WIDTHS = 1400, 1280, 1100, 400
-PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "describing_mechanisms", "printing",
-         "measured", "gallery", "gallery/puma560", "gallery/bicycle",
+PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "tutorials/wheel_on_a_road",
+         "describing_mechanisms", "printing", "measured", "gallery", "gallery/puma560", "gallery/bicycle",
          "reference/system", "reference/module", "contributing", "genindex")
 
 
@@ -194,6 +194,10 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
         assert 'class="highlight-text' in page or '<div class="formula">' in page, source.stem
         views = re.findall(r"^(?!plt)\w+\.(?:view|show)\(\)$", source.read_text(encoding="utf-8"), re.MULTILINE)
         assert page.count('<iframe class="view"') == len(views) and "View(&#39;" not in page, source.stem
+        systems = re.findall(r"^display\((?:arm|car|turbine)\)$", source.read_text(encoding="utf-8"), re.MULTILINE)
+        assert page.count('<div class="shown"><div><b>System(') == len(systems), source.stem
+        films = source.read_text(encoding="utf-8").count('format="gif"')
+        assert len(re.findall(r'src="[^"]*\.gif"', page)) == films, source.stem
 
 
 @pytest.mark.parametrize(("name", "views"), [("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),

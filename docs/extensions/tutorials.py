@@ -5,6 +5,7 @@ python docs/extensions/tutorials.py [NAME ...] runs notebooks and keeps what the
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import io
 import json
@@ -26,6 +27,8 @@ NOTEBOOKS, PAGES, VIEWS = ROOT / "notebooks", ROOT / "docs" / "tutorials", ROOT 
 RESULTS = NOTEBOOKS / "results"
 # Pages have an ending of their own: what stands in .md files is written by hand.
 ENDING = ".myst"
+# What HTML of a mechanism, module or motion begins with; that of other results is for notebooks, with formulas as TeX.
+TABLES = "<div><b>"
 # Colours of kept pictures, lines of text that a page shows, seconds that a cell may take.
 COLORS, LINES, LIMIT = 64, 60, 300
 
@@ -69,6 +72,8 @@ def block_of(output: dict[str, str]) -> str:
         return f"$$\n{output['latex']}\n$$"
     if "view" in output:
         return frame(f"{output['view']}.html", output["text"])
+    if "html" in output:
+        return f"```{{raw}} html\n<div class=\"shown\">{output['html']}</div>\n```"
     return f"```text\n{output['text']}\n```"
 
 
@@ -106,7 +111,7 @@ def run(name: str) -> None:
     notebook = jupytext.read(NOTEBOOKS / f"{name}.py")
     NotebookClient(notebook, timeout=LIMIT, kernel_name="python3", resources={"metadata": {"path": str(NOTEBOOKS)}}).execute()
     RESULTS.mkdir(exist_ok=True)
-    for old in (*RESULTS.glob(f"{name}_*.png"), *RESULTS.glob(f"{name}_view_*.json")):
+    for old in (*RESULTS.glob(f"{name}_*.png"), *RESULTS.glob(f"{name}_*.gif"), *RESULTS.glob(f"{name}_view_*.json")):
         old.unlink()
     cells, pictures, views = [], 0, 0
     for cell in notebook.cells:
@@ -119,13 +124,16 @@ def run(name: str) -> None:
                 file = f"{name}_view_{views}"
                 (RESULTS / f"{file}.json").write_text(json.dumps(view, ensure_ascii=False) + "\n", encoding="utf-8")
                 outputs.append({"view": file, "text": f"{view['name']}: a view that turns, zooms and moves"})
-            elif "image/png" in data:
+            elif image := data.get("image/png", data.get("image/gif")):
                 pictures += 1
-                image = f"{name}_{pictures}.png"
-                (RESULTS / image).write_bytes(small(data["image/png"]))
-                outputs.append({"image": image, "text": f"picture {pictures} of {name}"})
+                kind = "png" if "image/png" in data else "gif"
+                file = f"{name}_{pictures}.{kind}"
+                (RESULTS / file).write_bytes(small(image) if kind == "png" else base64.b64decode(image))
+                outputs.append({"image": file, "text": f"picture {pictures} of {name}"})
             elif "text/latex" in data:
                 outputs.append({"latex": data["text/latex"].strip().strip("$").strip()})
+            elif data.get("text/html", "").startswith(TABLES):
+                outputs.append({"html": data["text/html"]})
             elif data.get("text/plain", "").strip():
                 lines = data["text/plain"].rstrip().splitlines()
                 outputs.append({"text": "\n".join(lines if len(lines) <= LINES else [*lines[:LINES], "..."])})
@@ -162,8 +170,6 @@ def data_of_view(shown: str) -> dict[str, Any] | None:
 
 def small(encoded: str) -> bytes:
     """A picture with few colours."""
-    import base64
-
     from PIL import Image
 
     image = Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE)
