@@ -16,6 +16,7 @@ function start() {
     }
     const say = text => { note.textContent = text; };
     pointer(canvas, stage);
+    stage.fit();
     toolbar(find("tools"), stage, live);
     if (live) liveControls(find("sliders"), stage, scenes[0], say);
     else playControls(find("player"), find("plots"), stage, scenes, say);
@@ -64,7 +65,7 @@ function pointer(canvas, stage) {
 }
 
 function toolbar(parent, stage, live) {
-    button(parent, "⟲", "Look at everything", () => stage.reset());
+    button(parent, "⟲", "Look at everything, or at what is followed", () => stage.reset());
     button(parent, "+", "Nearer", () => stage.zoom(0.85));
     button(parent, "−", "Farther", () => stage.zoom(1 / 0.85));
     const layer = (name, text, color) =>
@@ -74,7 +75,7 @@ function toolbar(parent, stage, live) {
     layer("centres", "centres of mass");
     if (stage.scenes.some(s => s.items.some(i => i.layer === "inertia"))) layer("inertia", "inertia");
     const bodies = stage.scenes[0].data.bodies.map((name, k) => [k, name]);
-    choice(parent, "follow ", [[-1, "nothing"], ...bodies], k => stage.setFollow(k));
+    choice(parent, "follow ", [[-1, "nothing"], ...bodies], k => stage.setFollow(k)).value = stage.follow;
     if (live) return;
     choice(parent, "trail ", [[-2, "none"], [-1, "all"], ...bodies], k => { stage.trail = k; stage.invalidate(); });
     const kinds = new Map(stage.scenes.flatMap(s => s.source.arrows.map(({ layer, title, color }) => [layer, { title, color }])));

@@ -1,5 +1,9 @@
 // What is seen: a camera that turns, the solids of one mechanism or of several beside each other, names under the pointer.
 const FIELD = 0.6;
+// Lengths of a mechanism beyond which the camera goes along with a motion.
+const FAR = 8;
+// Of the grid to each side of its middle.
+const LINES = 10;
 // Of a side of the water, where it has waves.
 const FACETS = 48;
 const AXES = [["x", "#D55E00"], ["y", "#009E73"], ["z", "#0072B2"]];
@@ -56,9 +60,9 @@ class Stage {
         return found;
     }
 
-    // Look at all that is drawn, over the whole motion.
+    // Look at all that is drawn, over the whole motion; while a body is followed, at the mechanism as it is now.
     fit() {
-        const all = this.scenes.map(scene => {
+        let all = this.scenes.map(scene => {
             const { source, data } = scene, now = source.time, found = [];
             const count = data.kind === "recorded" ? 40 : 1;
             for (let k = 0; k < count; k++) {
@@ -74,7 +78,18 @@ class Stage {
         const level = this.scenes[0].data.grounds.find(plane => inner(plane, this.up) > 1 - 1e-6);
         this.floor = level ? level[3] : all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
         this.radius = Math.max(0.5 * size(minus(high, low)), 0.25 * this.length);
-        this.camera = { target: times(add(low, high), 0.5), distance: 1, azimuth: this.planar ? 0 : -0.95, elevation: this.planar ? 0 : 0.34 };
+        this.middle = times(add(low, high), 0.5);
+        let target = this.middle;
+        const [{ data }] = this.scenes, alone = data.kind === "recorded" && this.scenes.length === 1;
+        if (!this.home && alone && 2 * this.radius > FAR * this.length) this.follow = this.farthest();
+        if (this.follow >= 0) {
+            const now = this.reach(this.scenes[0]);
+            target = times(now.reduce((sum, p) => add(sum, p)), 1 / now.length);
+            const r = Math.max(...now.map(p => size(minus(p, target))));  // it may turn
+            all = [[r, 0, 0], [0, r, 0], [0, 0, r]].flatMap(e => [add(target, e), minus(target, e)]);
+            this.followed = this.scenes[0].source.world(this.follow, 0, 0, 0);
+        }
+        this.camera = { target, distance: 1, azimuth: this.planar ? 0 : -0.95, elevation: this.planar ? 0 : 0.34 };
         const aspect = Math.max(0.1, this.canvas.clientWidth / this.scenes.length / (this.canvas.clientHeight || 1));
         const { x, y, z, f } = this.matrix(aspect), margin = 0.07 * this.length;
         this.camera.distance = all.reduce((far, p) => {
@@ -84,12 +99,24 @@ class Stage {
         this.home = { ...this.camera };
     }
 
-    grid(scene) {
-        const count = 10, reach = 1.2 * scene.data.length, z = 0, lines = [];
-        for (let k = -count; k <= count; k++) {
-            const v = reach * k / count;
-            for (const [a, b] of [[[v, -reach], [v, reach]], [[-reach, v], [reach, v]]]) lines.push(...a, z, 0, 0, 1, ...b, z, 0, 0, 1);
+    // The first body that comes about as far as any.
+    farthest() {
+        const { source } = this.scenes[0], now = source.time, bodies = [...Array(source.bodies).keys()];
+        const ways = bodies.map(() => 0), starts = bodies.map(k => source.world(k, 0, 0, 0));
+        for (const t of source.t) {
+            source.seek(t);
+            for (const k of bodies) ways[k] = Math.max(ways[k], size(minus(source.world(k, 0, 0, 0), starts[k])));
         }
+        source.seek(now);
+        return ways.findIndex(way => way > 0.9 * Math.max(...ways));
+    }
+
+    // Cell by cell: of a line that goes on behind the camera some browsers draw nothing.
+    grid(scene) {
+        const step = 1.2 * scene.data.length / LINES, lines = [];
+        for (let k = -LINES; k <= LINES; k++) for (let i = -LINES; i < LINES; i++)
+            for (const [a, b] of [[[k, i], [k, i + 1]], [[i, k], [i + 1, k]]])
+                lines.push(a[0] * step, a[1] * step, 0, 0, 0, 1, b[0] * step, b[1] * step, 0, 0, 0, 1);
         return this.renderer.mesh(new Float32Array(lines), null);
     }
 
@@ -149,12 +176,16 @@ class Stage {
         const { source, data } = scene, { renderer, library } = this, unitScale = [1, 1, 1];
         scene.picks = [];
         if (scene.floor && !data.water) {
-            // As large as the way of the motion.
-            const grow = Math.max(1, this.radius / (1.2 * data.length)), wide = [grow, grow, 1];
+            // As large as the way of the motion; around a body that is followed, with lines that stay where they are.
+            const grow = Math.min(Math.max(1, this.radius / (1.2 * data.length)), this.follow < 0 ? Infinity : 4), wide = [grow, grow, 1];
+            const step = 1.2 * data.length * grow / LINES;
             const lines = dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], planes = data.grounds.length ? data.grounds : [[...this.up, this.floor]];
             for (const [x, y, z, level] of planes) {
-                const normal = [x, y, z], place = add(this.home.target, normal, level - inner(this.home.target, normal));
+                const normal = [x, y, z];
                 const side = unit(cross(normal, Math.abs(inner(normal, this.ahead)) < 0.9 ? this.ahead : this.up)), ahead = cross(side, normal);
+                let place = add(this.middle, normal, level - inner(this.middle, normal));
+                if (this.follow >= 0) for (const axis of [side, ahead])
+                    place = add(place, axis, step * Math.round(inner(axis, minus(source.world(this.follow, 0, 0, 0), place)) / step));
                 renderer.draw(scene.floor, placed(ahead, side, normal, place, wide), wide, lines, 1, 2);
             }
         }
@@ -174,7 +205,7 @@ class Stage {
     }
 
     drawWater(scene) {
-        const { water: w } = scene.data, r = 4 * this.radius, [x, y] = this.home.target;
+        const { water: w } = scene.data, r = 4 * this.radius, [x, y] = this.middle;
         const [[x0, y0], [x1, y1]] = w.reach || [[x - r, y - r], [x + r, y + r]];
         const middle = [(x0 + x1) / 2, (y0 + y1) / 2, w.level], half = [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length];
         const mesh = w.waves ? this.surfaceOf(scene, w, middle, half) : this.library.box, one = [1, 1, 1];
@@ -286,7 +317,7 @@ class Stage {
     // Flat ground of a plane, as deep as what stands on it.
     drawGround([x, y, z, level], dark) {
         const thick = 0.02 * this.length, one = [4 * this.radius, thick, 0.25 * this.length], normal = [x, y, z];
-        const middle = add(this.home.target, normal, level - thick - inner(this.home.target, normal));
+        const middle = add(this.middle, normal, level - thick - inner(this.middle, normal));
         this.renderer.draw(this.library.box, placed(cross(normal, this.ahead), normal, this.ahead, middle, one), one,
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
@@ -396,7 +427,6 @@ class Stage {
     }
 
     reset() {
-        this.setFollow(-1);
         this.fit();
         this.invalidate();
     }

@@ -248,6 +248,27 @@ def test_follow_trail_and_comparison(arm: Solution, chromium: Any, tmp_path: Pat
         np.testing.assert_allclose(force[0], wanted[k, :3], atol=0.01 * np.abs(wanted).max())
 
 
+def test_the_camera_goes_along_with_a_motion_that_goes_far(arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    """A disc that rolls many diameters is followed from the start, and stays as large; an arm on its stand is not followed."""
+    rolled = sd.systems.rolling_disc().compile(backend="numpy").simulate((0, 5), rtol=1e-6)
+    radius = float(rolled.module.default_parameters[rolled.module.metadata.parameters.index("R")])
+    assert np.linalg.norm(np.ptp(rolled.q[:, :2], axis=0)) > 8 * 2 * radius
+    followed = "document.querySelector('#tools .choice select').value"
+    rolled.view(tmp_path / "disc.html")
+    with Opened(chromium, tmp_path / "disc.html") as opened:
+        assert opened.page.evaluate(followed) == "0"
+        for t in (0.0, 3.0, 5.0):
+            opened.slide("t", t)
+            target, eye = np.array(opened.page.evaluate("[symdyn.stage.target, symdyn.stage.eye[0]]"))
+            assert np.linalg.norm(target - rolled(t)[:3]) < 0.1 * radius
+            assert 2 * radius < np.linalg.norm(eye - target) < 10 * radius
+        opened.page.keyboard.press("Home")
+        assert opened.page.evaluate(followed) == "0"
+    arm.view(tmp_path / "arm.html")
+    with Opened(chromium, tmp_path / "arm.html") as opened:
+        assert opened.page.evaluate(followed) == "-1"
+
+
 def test_thinning_keeps_what_the_eye_sees(arm: Solution) -> None:
     from symdyn.viewer.recorded import _error, _quaternions, _rows
 
