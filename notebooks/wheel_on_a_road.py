@@ -42,6 +42,9 @@ weight = (m_s + m_u) * g
 tyre = sp.Max(0, weight + k_t * (h - z_u))
 car.add_force(body, [0, 0, suspension])
 car.add_force(wheel, [0, 0, tyre - weight - suspension])
+car.draw(body, sd.shapes.Box([0.8, 0.5, 0.1], center=[0, 0, 0.25]), color="steelblue")
+car.draw(body, sd.shapes.Line([(0, 0, 0.2)], 5.0, to=(wheel, (0, 0, 0))), color="0.45")  # spring and damper
+car.draw(wheel, sd.shapes.Cylinder([0, -0.1, 0], [0, 0.1, 0], 0.3), color="0.25")
 car.defaults = {m_s: 400, m_u: 40, k_s: 20e3, c_s: 1500, k_t: 180e3, g: 9.81}
 module = car.compile()
 values = {str(p): value for p, value in car.defaults.items()}
