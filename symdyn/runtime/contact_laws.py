@@ -147,17 +147,17 @@ def _may_be_kept(D: np.ndarray, sites: Sequence[Site], k: int) -> bool:
     site = sites[k]
     if len(sites) == 1 or len(site.tangents) != 1 or site.kinetic == 0:
         return False
-    return _moves_with(D, site.tangents[0], [row for row in range(len(D)) if row != site.tangents[0]])
+    return moves_with(D, site.tangents[0], [row for row in range(len(D)) if row != site.tangents[0]])
 
 
 def _is_kept(D: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], k: int) -> bool:
     """Whether the rows that hold keep a site from slipping."""
     held = [site.rows[0] for site, mode in zip(sites, modes, strict=True) if site.normal is not None and mode.held]
     held += [row for site, mode in zip(sites, modes, strict=True) if mode.kind == STICKING for row in site.tangents]
-    return _moves_with(D, sites[k].tangents[0], held)
+    return moves_with(D, sites[k].tangents[0], held)
 
 
-def _moves_with(D: np.ndarray, row: int, held: Sequence[int]) -> bool:
+def moves_with(D: np.ndarray, row: int, held: Sequence[int]) -> bool:
     """Whether a row does not move where others do not."""
     if not held:
         return False

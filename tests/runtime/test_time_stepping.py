@@ -98,7 +98,6 @@ def test_a_block_on_a_slope_stays_or_slides_as_in_closed_form(friction: float) -
     assert solution.stepped is not None and solution.stepped.residual < 1e-11 and solution.stepped.depth < 1e-11
 
 
-@pytest.mark.native  # without fused operations its corners do not settle
 def test_a_tumbling_block_approaches_the_run_that_locates_its_impacts() -> None:
     module, t, start = block(0.3, 0.0), np.linspace(0, 1, 51), {"y": 0.5, "theta": 0.3}
     exact = module.simulate(t, q=start, rtol=1e-10)

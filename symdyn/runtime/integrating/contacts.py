@@ -21,12 +21,25 @@ import numpy as np
 from symdyn.backend.metadata import ContactRecord, ModuleMetadata
 from symdyn.contact_kinds import BODIES, CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Solved, degenerate, held, impact, solutions
+from symdyn.runtime.contact_laws import (
+    OPEN,
+    SLIDING,
+    STICKING,
+    Mode,
+    Site,
+    Solved,
+    degenerate,
+    held,
+    impact,
+    moves_with,
+    solutions,
+)
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
-from symdyn.runtime.integrating.slip_begins import TOLERATED, SlipBegins
+from symdyn.runtime.integrating.slip_begins import LARGER, LONGEST, SHORTEST, TOLERATED, SlipBegins
+from symdyn.runtime.integrating.slip_begins import ROUNDED as RESOLVED
 from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.stronge import stronge
@@ -64,6 +77,8 @@ LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWES
 GRACE = 1e-9
 # Part of the run for which a contact that has opened without a speed is near enough to count as leaving.
 LEAVES = 1e-5
+# Forces this near to their bounds, by the largest, are looked at: whether they go on beyond.
+AT_BOUND = 1e-6
 # A speed, m/s, that no slip comes near: added to the slip it holds the direction of friction.
 HOLDS = 1e30
 
@@ -360,7 +375,7 @@ class _Phases:
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
         self.closing: set[int] = set()  # at the latest switch
-        self.left: dict[int, float] = {}  # when contacts opened since nothing pressed them any more
+        self.left: dict[int, float] = {}  # when contacts opened since nothing pressed them, or not any more
         self.ends = SlipEnds()  # of the phase
         self.latest_time = begin  # of a switch that changes the motion
 
@@ -422,9 +437,13 @@ class _Phases:
 
     def _is_plain(self) -> bool:
         """Whether nothing is under way at a switch, or before a phase, that C does not know of."""
-        kept = any(still and mode == SLIDING for still, mode in zip(self.still, self.modes, strict=True))
-        return not (kept or self.begins.directions or self.begins.since or self.unlooked or self.ruled_out or self.at_once
+        return not (self._kept() or self.begins.directions or self.begins.since or self.unlooked or self.ruled_out or self.at_once
                     or self.shared or self.until < np.inf)
+
+    def _kept(self) -> list[int]:
+        """Contacts with friction at its bound that others keep from slipping, see symdyn.runtime.contact_laws.Mode."""
+        return [k for k, (still, mode) in enumerate(zip(self.still, self.modes, strict=True))
+                if still and mode == SLIDING and self.tangents[k]]
 
     def _quickly(self, quick: Motion) -> bool:
         """Go on in C as far as that goes; whether it is the end."""
@@ -452,6 +471,7 @@ class _Phases:
         quick.slipping[:] = 0
         quick.mode[:], quick.still[:], quick.passed[:] = [CODE_OF[mode] for mode in self.modes], self.still, self.passed
         quick.sign[:] = [direction[0] if len(direction) else 0.0 for direction in self.directions]
+        quick.left[:] = [self.left.get(k, -np.inf) for k in range(len(self.records))]
         latest: list[Happened] = []
         while self.fired and self.happened and self.happened[-1].t == self.t:
             latest.insert(0, self.happened.pop())
@@ -493,6 +513,7 @@ class _Phases:
         self.fired = [self.of_event[k] for k in quick.fired[:record.n_fired].tolist()]
         self.modes = [MODES[mode] for mode in quick.mode.tolist()]
         self.still, self.passed = list(map(bool, quick.still.tolist())), list(map(bool, quick.passed.tolist()))
+        self.left = {k: t for k, t in enumerate(quick.left.tolist()) if t > -np.inf}
         for k, sign in enumerate(quick.sign.tolist()):
             if len(self.directions[k]) and self.directions[k][0] != sign:
                 self.directions[k] = np.full(self.records[k].tangents, sign)
@@ -522,7 +543,6 @@ class _Phases:
     def _recall(self, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note a switch; raise _Stop where those of late have been too many."""
         self.recent.append((t, tuple([k for k, _ in fired])))
-        self.left |= {k: t for k, what in fired if what == "opens"}
         begin, end = self.request.span
         if self.request.step and len(self.recent) >= MOST_FAST:
             passed_by = t - self.recent[-MOST_FAST][0]
@@ -807,6 +827,7 @@ class _Phases:
                             "computed across it; end the motion before, or take them by differences of two motions")
         turned = {k for k, what in fired if what in (IGNORED, COUNTS)}  # where what they are ignored by is at its zero
         self._pass_by(t, x, self._ignored(t, x) if start else [one != (k in turned) for k, one in enumerate(self.passed)])
+        kept = self._kept()
         for k, what in fired:
             if what == "sticks" and len(self.tangents[k]) == 1:
                 self.still[k] = True
@@ -816,16 +837,16 @@ class _Phases:
                 if not self.still[k] and size <= TOLERATED * tolerated and self.done:  # nor has one that turns near them
                     begin = self.done[-1]
                     self.still[k] = self._slip(float(begin.t[0]), begin.x[0], k) <= TOLERATED * tolerated
-            elif what in ("opens", "slips"):
-                self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         self.made = [Made(tuple(self.modes), tuple(self.still))]
         x = self._onto_surfaces(t, x)
         at = self._numbers(t, x)
+        self._rule_out(at, fired, kept)
         self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0),
                         np.abs(at.gap[self.placed]).max(initial=0.0))
         closing = {k for k, what in fired if what == "closes"}
         for k in [k for k in closing if self._is_leaving(k, t, x, at)]:
             closing.discard(k)
+            del self.happened[max(i for i, one in enumerate(self.happened) if one.event == self.events[k]["closes"])]
             self.unlooked.add(self.events[k]["closes"])
             self.until = t + max(GRACE * (self.request.span[1] - self.request.span[0]), t - self.left[k])
         if start:
@@ -853,7 +874,7 @@ class _Phases:
             for k in self.frictions:
                 self.still[k] = self._slow(at, k)
         closed = sorted([*[k for k in touching if k not in rebound], *self.frictions])
-        self._choose(t, at, closed)
+        self._choose_lasting(t, x, at, closed)
         resting = self._zeno(t, at, rebound, hit)
         if resting:
             closed = sorted({*closed, *resting})
@@ -861,7 +882,8 @@ class _Phases:
                 self.modes[k], self.still[k] = SLIDING, self._slow(at, k)
             self.made.append(Made(tuple(self.modes), tuple(self.still)))
             x = self._onto_surfaces(t, x)
-            self._choose(t, self._numbers(t, x), closed)
+            self._choose_lasting(t, x, self._numbers(t, x), closed)
+        self.left |= {k: t for k in closed if self.modes[k] == OPEN}
         self._pass_by(t, x, [self.passed[k] if k in turned else now for k, now in enumerate(self._ignored(t, x))])
         return x
 
@@ -1029,8 +1051,59 @@ class _Phases:
                 self.softness[k] = (1 / along - 1) ** 0.5, (1 / normal - 1) ** 0.5
             first += self.records[k].rows
 
-    def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> None:
-        """The modes of the contacts that are closed, from the accelerations; the others are open."""
+    def _rule_out(self, at: Numbers, fired: Sequence[tuple[int, str]], kept: Sequence[int]) -> None:
+        """Rule out the modes that contacts leave. One that slips has held what others at their bounds, which it kept from
+        slipping, did not: they slip with it, and what rounding has left of their bounds does not hold it instead."""
+        held = [row for k, row in enumerate(self.normal) if self.records[k].normal and self.modes[k] != OPEN] if kept else []
+        for k, what in fired:
+            if what in ("opens", "slips"):
+                self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
+            for j in kept if what == "slips" else ():
+                if moves_with(at.D, self.tangents[j][0], [*held, *self.tangents[k]]):
+                    self.ruled_out.setdefault(j, set()).add(STICKING)
+
+    def _choose_lasting(self, t: float, x: np.ndarray, at: Numbers, closed: Sequence[int]) -> None:
+        """The modes of the contacts that are closed, but those whose forces are at their bounds and go on beyond."""
+        still, directions, doubts = list(self.still), list(self.directions), copy.deepcopy(self.doubts)
+        for _ in closed:
+            beyond = self._beyond(t, x, at, self._choose(t, at, closed))
+            if not beyond:
+                return
+            self._rule_out(at, beyond, self._kept())
+            self.still, self.directions, self.doubts = list(still), list(directions), copy.deepcopy(doubts)
+        self._choose(t, at, closed)
+
+    def _beyond(self, t: float, x: np.ndarray, at: Numbers, forces: np.ndarray) -> list[tuple[int, str]]:
+        """Contacts whose forces are beyond their bounds, by what the laws of contact take for rounding, and go on from there:
+        they open or slip at once, since no zero of their events follows. forces: of all rows."""
+        size = float(np.abs(forces).max(initial=0.0))
+        watched = {}  # events with the sizes of what stands in them
+        for k, (mode, own) in enumerate(zip(self.modes, self.events, strict=True)):
+            pressed = float(forces[self.normal[k]]) if self.records[k].normal else 1.0
+            if mode != OPEN and "opens" in own and pressed <= AT_BOUND * size:
+                watched[k, "opens"] = size
+            bound = float(at.static[k]) * pressed
+            if mode == STICKING and bound - np.linalg.norm(forces[self.tangents[k]]) <= AT_BOUND * size:
+                watched[k, "slips"] = size * max(bound, RESOLVED * size)
+        if not watched:
+            return []
+        p, n, end = self._parameters(), self.request.n_state, self.request.span[1]
+        places, sizes = [self.events[k][what] for k, what in watched], np.array(list(watched.values()))
+        now = self._values("events", t, x[:n], p)[places]
+        f = self._values("rhs", t, x[:n], p)[:n]
+        unknown, found = now < 0, np.zeros(len(places), dtype=bool)
+        after = max(SHORTEST * self.begins.length, 64 * np.finfo(float).eps * abs(t))
+        while unknown.any() and after <= min(LONGEST * self.begins.length, end - t):
+            ahead = x[:n] + after / 2 * (f + self._values("rhs", t + after, x[:n] + after * f, p)[:n])
+            change = self._values("events", t + after, ahead, p)[places] - now
+            known = unknown & (np.abs(change) > RESOLVED * sizes)
+            found |= known & (change < 0)
+            unknown &= ~known
+            after *= LARGER
+        return [one for one, goes in zip(watched, found.tolist(), strict=True) if goes]
+
+    def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> np.ndarray:
+        """The modes of the contacts that are closed, from the accelerations; the others are open. The forces of all rows."""
         places = [row for k in closed for row in self.rows[k]]
         D, b = at.D[np.ix_(places, places)], at.free[places]
         found = solutions(D, b, self._sites(at, closed)) if places else []
@@ -1064,6 +1137,10 @@ class _Phases:
             self._share(t, closed, found[0])
         self.begins.switched(t, begins, {k: record.tangents == 2 for k, record in enumerate(self.records)
                                          if self.modes[k] == SLIDING})
+        forces = np.zeros(len(at.free))
+        if found:
+            forces[places] = found[0].lam
+        return forces
 
     def _doubt(self, kind: str, t: float, of: Sequence[int], text: str, weight: float = 0.0) -> None:
         """Note what to warn of, with its contacts."""

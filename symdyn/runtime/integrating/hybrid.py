@@ -159,7 +159,7 @@ class Motion:
         self.mode, self.still, self.passed, self.fired, self.happened = (
             take(record, name, np.zeros(size, dtype=np.intc)) for name, size in (
                 ("mode", n), ("still", n), ("passed", n), ("fired", n_events), ("happened", record.most_happened)))
-        self.sign = take(record, "sign", np.zeros(n))
+        self.sign, self.left = take(record, "sign", np.zeros(n)), take(record, "left", np.full(n, -np.inf))
         self.slipping = take(record, "slipping", np.zeros(n, dtype=np.intc))
         put(record, np.intc, old_mode=n, old_still=n, old_passed=n, ruled_out=n, look=n_events, leaves=n)
         put(record, float, old_sign=n, old_x=n_x, rows_of_events=events_waiting(n_events) * (2 + 2 * n_x),

@@ -317,7 +317,10 @@ static int symdyn_make_switch(symdyn_hybrid *h) {
     if (symdyn_choose(h, n_closed, closed, acceleration)) return SYMDYN_LEFT;
     for (int k = 0; k < h->n_contacts; k++)
         if (h->leaves[k] && symdyn_flight_is_short(h, k, acceleration[h->first[k]])) return SYMDYN_LEFT;
-    return symdyn_pass_by(h, h->x, 0);
+    if (symdyn_pass_by(h, h->x, 0)) return SYMDYN_LEFT;
+    for (int s = 0; s < n_closed; s++)
+        if (h->mode[closed[s]] == SYMDYN_OPEN) h->left[closed[s]] = t;
+    return 0;
 }
 
 // Make a switch. Returns 0, or SYMDYN_LEFT with all as it was.

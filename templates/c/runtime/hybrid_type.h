@@ -48,6 +48,7 @@ typedef struct {
     int *mode, *still, *passed;  // of every contact; whether it does not slip; whether it is ignored while open
     int *slipping;               // whether its slip begins, so that its direction is held
     double *sign;                // of its slip, 0: none
+    double *left;                // when it opened since nothing pressed it; -infinity: it did not
     int *old_mode, *old_still, *old_passed, *ruled_out, *look, *leaves;
     double *old_sign, *old_x, *rows_of_events, *states, *ahead;
 
