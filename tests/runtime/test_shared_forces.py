@@ -49,7 +49,7 @@ def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(frictio
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
     module, begin = table(legs, (*push, 0), (0, 0, height), friction=friction), STATIC * MASS * G / RATE
     solution = module.simulate((0, begin + 1), q=start(module), rtol=1e-10)
-    assert slips(solution) == pytest.approx(begin, rel=1e-8)
+    assert slips(solution) == pytest.approx(begin, rel=1e-7)  # rows are softened by 1e-8: compilers differ by 2e-8
     kinetic = friction if isinstance(friction, float) else KINETIC
     after = RATE * ((begin + 1)**3 / 6 - begin**3 / 6 - begin**2 / 2) / MASS - kinetic * G / 2
     assert np.hypot(*solution.q[-1, :2]) == pytest.approx(after, rel=1e-7)
