@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import sympy as sp
 
@@ -146,10 +146,10 @@ class Contact:
         cam = self.on_b
         if not isinstance(cam, Cam) or not isinstance(cam.angle, sp.Symbol):
             return []
-        name = cam.angle.name
+        name, curve = cam.angle.name, cast("Any", cam.radius)
+        spline = not isinstance(curve, (sp.Basic, int, float)) and callable(curve)
         for angle in (2 * math.pi * (k + 0.5) / AROUND for k in range(AROUND)):
-            spline = not isinstance(cam.radius, (sp.Basic, int, float)) and callable(cam.radius)
-            radius = float(cam.radius(angle)) if spline else value_of(cam.radius, {**defaults, name: angle})
+            radius = float(curve(angle)) if spline else value_of(curve, {**defaults, name: angle})
             if radius is not None and not radius > 0:
                 return [f"{self.where}: the radius of the Cam is {radius:g} m at the angle {angle:.4g}; pass one that is above 0 "
                         "all around"]

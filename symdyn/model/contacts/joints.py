@@ -297,9 +297,9 @@ class Rope(JointElement):
         # The rate of the distance, with a length that is not zero where the ends coincide.
         ends = [[component(name, list(p), "position", k) for k in range(2 if system.planar else 3)]
                 for name, p in zip(names, at, strict=True)]
-        between = [(a - b, a.dot - b.dot) for a, b in zip(*ends, strict=True)]
-        self.span = sp.sqrt(sp.Add(*[d**2 for d, _ in between]) + (COINCIDE * self.length)**2)
-        rate = sp.Add(*[d * v for d, v in between]) / self.span
+        apart_by = [(a - b, a.dot - b.dot) for a, b in zip(*ends, strict=True)]
+        self.span = sp.sqrt(sp.Add(*[d**2 for d, _ in apart_by]) + (COINCIDE * self.length)**2)
+        rate = sp.Add(*[d * v for d, v in apart_by]) / self.span
         return [Row(self.name, STOP, self.length - apart, -rate, ())]
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
