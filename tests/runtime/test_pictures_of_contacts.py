@@ -120,7 +120,7 @@ def test_pages_carry_the_forces_of_contacts(landing: Any) -> None:
     data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', landing.view().html, re.S)[1])["motions"][0]  # type: ignore[index]
     (contacts,) = data["arrows"]
     assert contacts["names"] == ["contact left", "contact right"] and contacts["layer"] == "contacts"
-    assert data["ground"] == pytest.approx(0.0, abs=1e-9)
+    assert data["grounds"] == [pytest.approx([0, 1, 0, 0], abs=1e-9)]
     packed = contacts["values"]
     columns = np.frombuffer(base64.b64decode(packed["data"]), "<u2").reshape(packed["columns"], -1)
     last = np.array(packed["low"]) + np.array(packed["step"]) * columns[:, -1]

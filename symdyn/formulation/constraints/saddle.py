@@ -11,8 +11,6 @@ from fractions import Fraction
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from symdyn.formulation.trees.mass_matrix import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
@@ -127,6 +125,9 @@ def narrow_order(M: np.ndarray, C: np.ndarray) -> list[int]:
     """
     if len(M) < ORDERED_FROM:
         return list(range(len(M)))
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
     near = np.array([[not is_zero(e) for e in row] for row in M])
     for row in C:
         places = [k for k, e in enumerate(row) if not is_zero(e)]

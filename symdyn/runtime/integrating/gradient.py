@@ -109,7 +109,8 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     asked = Asked.of(module, by, p, free)
     method = _checked(module, request, asked, method or DEFAULT)
     check_start(module, span[0], start, p)
-    check_compliance(module, span[0], start, p, free.at(span[0], start))
+    if metadata.compliant:
+        check_compliance(module, span[0], start, p, free.at(span[0], start))
     if metadata.contacts:
         check_overlap(module, span[0], start, p, free.at(span[0], start))
     request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))

@@ -104,7 +104,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             stack.enter_context(module.noting(lambda label: bar.set_description(_underway(module, label))))
         with contextlib.suppress(InputRaised):  # the run ends with it, as with what raises later
             check_start(module, span[0], start, p)
-            check_compliance(module, span[0], start, p, free.at(span[0], start))
+            if metadata.compliant:
+                check_compliance(module, span[0], start, p, free.at(span[0], start))
             if metadata.contacts:
                 check_overlap(module, span[0], start, p, free.at(span[0], start))
             if metadata.contact_groups:
