@@ -174,7 +174,8 @@ def test_a_sine_that_is_slightly_wrong_is_found_in_every_function(measured: dict
 @needs_c
 @pytest.mark.parametrize(("old", "new"), [
     ("lam[k] -= a * symdyn_less(", "lam[k] -= 1.001 * a * symdyn_less("), ("SYMDYN_ROUNDS 5", "SYMDYN_ROUNDS 4"),
-    ("r[i] = symdyn_less(columns[i] * f[i], n, M[i], 1, x);", "r[i] = columns[i] * f[i];")], ids=["factor", "rounds", "term"])
+    ("r[i] = symdyn_less(columns[i] * f[i], of_M[i].end - at, M[i] + at, 1, x + at);", "r[i] = columns[i] * f[i] + 0 * at;")],
+    ids=["factor", "rounds", "term"])
 def test_faults_next_to_lost_rank_are_found_there(measured: dict, source: Any, old: str, new: str) -> None:
     every = found(measured, source, old, new)
     assert all(f.beyond <= 0 for f in every) and every[0].near.beyond > 0
