@@ -165,6 +165,7 @@ KERNELS: dict[str, tuple[Kernel, Callable[[], np.ndarray]]] = {
 
 
 @needs_c
+@pytest.mark.native
 @pytest.mark.parametrize("name", KERNELS)
 def test_c_and_python_give_the_same_bits_and_reject_the_same(name: str, in_c: Compiled) -> None:
     kernel, inputs = KERNELS[name]

@@ -15,6 +15,9 @@ from symdyn.lab.firmware import on_target, tools
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.targets.cmake import deepest, stack_of
 
+# Stacks are counted by gcc.
+pytestmark = pytest.mark.native
+
 needs_cmake = pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("c++") is None, reason="no cmake or C++ compiler")
 needs_arm = pytest.mark.skipif(bool(tools()), reason=f"not on PATH: {tools()}")
 
