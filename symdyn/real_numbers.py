@@ -91,6 +91,11 @@ def number_of(value: Any, owner: str, wanted: str) -> float:
         raise ArgumentError(f"{owner}: {wanted}, found {shown(value)}: {error}") from None
 
 
+def in_range(values: Any, least: float, reached: bool, below: float) -> Any:
+    """Whether a number, or each of an array, is in the range that `range_text` asks for; what is no number is not."""
+    return ((values >= least) if reached else (values > least)) & (values < below)
+
+
 def range_text(least: float, reached: bool, below: float) -> str:
     """How a message asks for a number above `least`, or from it on if it is `reached`, and below another one, which may be
     infinite."""

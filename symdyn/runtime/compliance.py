@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.real_numbers import range_text
+from symdyn.real_numbers import in_range, range_text
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -34,7 +34,7 @@ def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray,
                 column = params[:, place[name]]
             else:  # it has become a number, which was checked
                 continue
-            good = (column >= least if reached else column > least) & (column < below)
+            good = in_range(column, least, reached, below)
             for row in np.flatnonzero(~good & np.isfinite(params).all(axis=1)).tolist():  # the others have a reason of their own
                 found.setdefault(row, {})[f"{what} of contact {contact.name} is {column[row]:g}; "
                                           f"{range_text(least, reached, below)}"] = None

@@ -8,7 +8,7 @@ Source: Hunt and Crossley, Coefficient of restitution interpreted as damping in 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
-from symdyn.real_numbers import range_text
+from symdyn.real_numbers import in_range, range_text
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -202,7 +202,8 @@ def ranges_by_parameters(given: Compliance, static: sp.Expr, kinetic: sp.Expr,
     return tuple(one for one in found if isinstance(one.value, sp.Basic) and not one.value.is_number)
 
 
-def compliance_faults(where: str, given: Any, numbers: Any, static: sp.Expr, kinetic: sp.Expr) -> list[str]:
+def compliance_faults(where: str, given: object, numbers: Callable[[Any], float | None], static: sp.Expr,
+                      kinetic: sp.Expr) -> list[str]:
     """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
@@ -222,6 +223,6 @@ def compliance_faults(where: str, given: Any, numbers: Any, static: sp.Expr, kin
         wrong.expression(value, f"{where}: {what}")
         found += wrong
         number = None if wrong else numbers(value)
-        if number is not None and not ((number >= least if reached else number > least) and number < below):
+        if number is not None and not in_range(number, least, reached, below):
             found.append(f"{where}: {what} is {number:g}; {range_text(least, reached, below)}")
     return found

@@ -1186,9 +1186,10 @@ class _Phases:
     def _outside(self, t: float, x: np.ndarray, p: np.ndarray) -> list[tuple[int, str]]:
         """Contacts in space that share forces and have left their cones where nothing looked at these."""
         force, found = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], p)).force, []
+        static = self._numbers(t, x).static
         for k, mode in enumerate(self.modes):
             if mode == STICKING and self.records[k].tangents == 2:
-                bound = float(self._numbers(t, x).static[k]) * float(force[self.normal[k]])
+                bound = float(static[k]) * float(force[self.normal[k]])
                 if bound < float(np.linalg.norm(force[self.tangents[k]])):
                     found.append((k, "slips"))
         return found
