@@ -183,12 +183,14 @@ class JumpRecord(NamedTuple):
 
 
 class ValidityRange(NamedTuple):
-    """The range that a load is meant for; message: what it means outside, with {value}."""
+    """The range that a load is meant for; message: what it means outside, with {value}; summed: whether it is the range of the
+    value's integral over time."""
 
     label: str
     least: float
     most: float
     message: str
+    summed: bool = False
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ ARGUMENTS = {
     **dict.fromkeys(("coordinate", "mass", "stiffness", "damping", "length", "pitch", "ratio", "offset", "density", "area",
                      "coefficient", "weight", "friction", "restitution", "width", "breakaway", "sliding", "lower", "upper",
                      "radius", "height", "frequency", "ramp", "gravity", "exponent", "dissipation", "slip_speed", "stribeck",
-                     "viscous", "elastic", "depth", "tube", "value", "rate", "expression", "ignored"), "expression"),
+                     "viscous", "elastic", "depth", "creep", "tube", "value", "rate", "expression", "ignored"), "expression"),
     **dict.fromkeys(("coordinates", "force", "torque", "amplitude", "phase", "reference"), "expressions"),
     **dict.fromkeys(("axis", "parent_point", "child_point", "point", "point_a", "point_b", "position", "wind", "anchor",
                      "fairlead", "com", "center", "size", "at", "normal"), "vector"),

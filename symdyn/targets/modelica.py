@@ -165,7 +165,8 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
         "events": list(zip(events, flat.results.get("events", ()), strict=True)),
         "clauses": _clauses(metadata, x, events, flat.results.get("event_resets", ())),
         "watches": [(" and ".join(_within(w, value)), _message(w.message, value))
-                    for w, value in zip(metadata.watches, flat.results.get("watches", ()), strict=True) if _within(w, value)],
+                    for w, value in zip(metadata.watches, flat.results.get("watches", ()), strict=True)
+                    if not w.summed and _within(w, value)],
         "violations": [v for v in (
             _Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),
             _Violation("violation_rate", "m/s", "rate of a violation", _moving(residuals[len(residuals) // 2:]))) if v.residuals],

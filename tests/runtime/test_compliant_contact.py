@@ -1,5 +1,6 @@
 """Compliant contacts against closed forms, differences and each other."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ G, TILT, MU, STIFFNESS = 9.81, np.radians(20), 0.5, 1e6
 C = sd.contacts
 
 
-def slope(bristles: Any = None, tilt: float = TILT, **more: Any) -> sd.System:
+def slope(bristles: Any = None, tilt: float = TILT, friction: float = MU, **more: Any) -> sd.System:
     """A block of 2 kg that moves along and across a slope."""
     x, y = sd.coordinates("x y")
     system = sd.System("slope", gravity=[G * np.sin(tilt), -G * np.cos(tilt)])
@@ -23,7 +24,7 @@ def slope(bristles: Any = None, tilt: float = TILT, **more: Any) -> sd.System:
     system.add_joint(sd.Prismatic("along", system.ground, slide, axis=[1, 0], coordinate=x))
     system.add_joint(sd.Prismatic("across", slide, block, axis=[0, 1], coordinate=y))
     law = {"stiffness": STIFFNESS, "exponent": 1, "dissipation": 10.0, "bristles": bristles, **more}
-    system.add_contact(sd.Contact("sole", block, system.ground, friction=(0.6, MU) if "stribeck" in more else MU,
+    system.add_contact(sd.Contact("sole", block, system.ground, friction=(0.6, MU) if "stribeck" in more else friction,
                                   law="compliant", compliance=C.Compliance(**law)))
     return system
 
@@ -119,7 +120,10 @@ def test_static_friction_without_a_curve_is_rejected_where_it_would_not_count() 
 @pytest.mark.parametrize(("law", "wrong"), [
     ({"stiffness": None}, "stiffness is None of type NoneType"), ({"stiffness": float("nan")}, "stiffness is nan; pass a finite"),
     ({"stiffness": 1e4, "slip_speed": "slow"}, "slip_speed is the text 'slow'"),
-    ({"stiffness": 1e4, "depth": sp.Symbol("deep")}, "depth is deep; pass a number, in m")])
+    ({"stiffness": 1e4, "depth": sp.Symbol("deep")}, "depth is deep; pass a number, in m"),
+    ({"stiffness": 1e4, "creep": sp.Symbol("far")}, "creep is far; pass a number, in m"),
+    ({"stiffness": 1e4, "creep": 1e-3}, "creep is limited, and there is no friction that holds; pass friction"),
+    ({"stiffness": 1e4, "creep": -1.0}, "creep is -1; pass a number above 0")])
 def test_what_is_no_number_of_a_compliance_is_named(law: dict[str, Any], wrong: str) -> None:
     system = sd.System("ball")
     ball = system.add_body("ball", mass=1.0)
@@ -257,6 +261,31 @@ def test_steps_end_where_the_gap_closes() -> None:
 def test_depth_beyond_what_is_meant_is_reported() -> None:
     with pytest.warns(SimulationWarning, match=r"contact sole: it goes .* m deep, its compliance is meant for 1e-05 m"):
         resting(slope(depth=1e-5), 0.01)
+
+
+def test_creep_beyond_what_is_meant_is_reported() -> None:
+    """A block on a slope creeps at the speed where friction balances its weight, and batches report it too."""
+    slow, ratio = 1e-3, np.tan(TILT) / MU
+    speed = slow * ratio / np.sqrt(1 - ratio**2)
+    module = slope(creep=1e-4, slip_speed=slow).compile()
+    start = {"q": [0, -2 * G * np.cos(TILT) / STIFFNESS], "u": [speed, 0]}
+    with pytest.warns(SimulationWarning, match="contact sole: it creeps .* m while friction holds, its compliance is meant for "
+                                               "0.0001 m") as found:
+        solution = module.simulate((0, 1), **start, method="radau5")
+    assert float(str(found[0].message).split("creeps ")[1].split(" m")[0]) == pytest.approx(speed, rel=1e-3)
+    assert solution["x"][-1] == pytest.approx(speed, rel=1e-3)
+    with pytest.warns(SimulationWarning, match="in 1 of 1 motions.*contact sole: it creeps"):
+        module.simulate_batch(t=np.linspace(0, 1, 21), q=start["q"], u=[start["u"]], method="radau5")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        module.simulate((0, 0.05), **start, method="radau5")
+
+
+def test_sliding_is_no_creep() -> None:
+    """A block pushed down the slope slides far, at speeds where friction does not hold."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        slope(creep=1e-4, slip_speed=1e-4, friction=0.1).compile().simulate((0, 1), q=[0, -2e-5], u=[1.0, 0], method="radau5")
 
 
 def test_faults_of_compliances_are_reported_together() -> None:

@@ -134,6 +134,10 @@ class Loads:
         found += [Watch(f"depth of contact {c.name}", -self.algebra.expression(c.gap), -math.inf, c.depth,
                         f"contact {c.name}: it goes {{value}} m deep, its compliance is meant for {c.depth:g} m; a larger "
                         "stiffness keeps it shallower") for c in self.model.compliant if c.depth is not None]
+        found += [Watch(f"creep of contact {c.name}", self.algebra.expression(c.held_slip), -math.inf, c.creep,
+                        f"contact {c.name}: it creeps {{value}} m while friction holds, its compliance is meant for {c.creep:g} "
+                        "m; a smaller slip_speed makes it creep less, and bristles with an elastic part do not creep", True)
+                  for c in self.model.compliant if c.creep is not None]
         return [*found, self.settled.watch] if self.implicit else found
 
     def _bending(self, body: FlexibleLink) -> Watch:

@@ -144,8 +144,8 @@ class TreeQuantities(Motion):
             own["compliant_contacts"] = self.compliant_contacts
         if any(contact.numbers for contact in self.model.compliant):
             own["compliant_numbers"] = self.compliant_numbers
-        deep = any(contact.depth is not None for contact in self.model.compliant)
-        if deep or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
+        limited = any(contact.depth is not None or contact.creep is not None for contact in self.model.compliant)
+        if limited or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation

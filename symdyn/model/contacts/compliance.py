@@ -59,6 +59,8 @@ class Compliance:
     viscous      s/m: friction that grows with the slip, by the normal force
     bristles     friction by bristles in place of the slip alone, see Bristles
     depth        m: runs that go deeper report it; None: no limit
+    creep        m: runs in which it creeps further while friction holds report it: the slip at speeds where friction is below
+                 99 % of the kinetic one, up to 7 slip_speed, summed over time; None: no limit
     located      whether steps end where the gap closes or opens, and where damping lets go, the kinks of the force: motions are
                  more exact, and batches run one by one. The events are NAME_touches and NAME_releases
 
@@ -74,6 +76,7 @@ class Compliance:
     viscous: Scalar = 0
     bristles: Bristles | None = None
     depth: float | None = None
+    creep: float | None = None
     located: bool = False
 
 
@@ -182,7 +185,8 @@ def _ranges(given: Compliance) -> list[Range]:
     found = [Range("stiffness", given.stiffness, reached=False), Range("exponent", given.exponent, 1.0),
              Range("dissipation", given.dissipation), Range("slip_speed", given.slip_speed, reached=False),
              Range("viscous", given.viscous)]
-    found += [Range(what, value, reached=False) for what, value in (("stribeck", given.stribeck), ("depth", given.depth))
+    found += [Range(what, value, reached=False) for what, value in (("stribeck", given.stribeck), ("depth", given.depth),
+                                                                        ("creep", given.creep))
               if value is not None]
     if isinstance(given.bristles, Bristles):
         found += [Range("stiffness of bristles", given.bristles.stiffness, reached=False),
@@ -211,8 +215,11 @@ def compliance_faults(where: str, given: object, numbers: Callable[[Any], float 
     if given.stribeck is None and not (static - kinetic).is_zero:
         found.append(f"{where}: static friction is {static} and kinetic friction {kinetic}, and compliant contacts take static "
                      "friction by Stribeck's curve; pass stribeck=, m/s, to the compliance, or one coefficient of friction")
-    if isinstance(given.depth, sp.Basic) and not given.depth.is_number:
-        found.append(f"{where}: depth is {given.depth}; pass a number, in m")
+    limits = (("depth", given.depth), ("creep", given.creep))
+    found += [f"{where}: {what} is {value}; pass a number, in m" for what, value in limits
+              if isinstance(value, sp.Basic) and not value.is_number]
+    if given.creep is not None and numbers(kinetic) == 0:
+        found.append(f"{where}: creep is limited, and there is no friction that holds; pass friction, or leave creep out")
     if isinstance(given.bristles, Bristles):
         if numbers(kinetic) == 0:
             found.append(f"{where}: bristles need friction; pass friction, or leave bristles out")

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 CLOSES, OPENS, STICKS, SLIPS, TURNS, IGNORED, COUNTS = "closes", "opens", "sticks", "slips", "turns", "ignored", "counts"
 TOUCHES, RELEASES = "touches", "releases"  # of compliant contacts
+# The part of the kinetic friction below which a compliant contact holds and should not slip.
+HELD = sp.Rational(99, 100)
 # A speed, m/s, that is added to the slip along the direction which friction in space is written by: a large one holds that
 # direction, a small one lets friction act against the slip.
 HOLDING, SLOW = sp.Symbol("contacts_holding", real=True), 1e-12
@@ -100,8 +102,9 @@ class RigidContact:
 
 @dataclass(frozen=True)
 class CompliantContact:
-    """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, and the depth
-    that is reported, m; where it touches and the force on body a, n-frame; what numbers that follow from parameters may be."""
+    """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, the depth and
+    the creep that are reported, m; where it touches and the force on body a, n-frame; what numbers that follow from parameters
+    may be."""
 
     name: str
     gap: sp.Expr
@@ -109,6 +112,7 @@ class CompliantContact:
     forces: tuple[sp.Expr, ...]
     slip_speed: sp.Expr
     depth: float | None
+    creep: float | None = None
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
     ranges: tuple[Range, ...] = ()
@@ -117,6 +121,12 @@ class CompliantContact:
     def expressions(self) -> list[sp.Expr]:
         """What it shows along a motion: gap, slip speed, forces, slips."""
         return [self.gap, self.slip_speed, *self.forces, *self.rows[1:]]
+
+    @property
+    def held_slip(self) -> sp.Expr:
+        """The size of the slip while it is closed and friction is below HELD of what it reaches in the end, else zero, m/s."""
+        slip = sp.sqrt(sp.Add(*[v**2 for v in self.rows[1:]]))
+        return sp.Piecewise((slip, sp.And(self.gap < 0, slip < HELD / sp.sqrt(1 - HELD**2) * self.slip_speed)), (0, True))
 
     @property
     def numbers(self) -> list[sp.Expr]:
@@ -244,7 +254,7 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     system.states += [State(z, rate) for z, rate in zip(deflections, law.rates, strict=True)]
     slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
-                                                      geometry.place(touch), _along(directions, law.forces),
+                                                      compliance.creep, geometry.place(touch), _along(directions, law.forces),
                                                       ranges_by_parameters(compliance, contact.static, contact.kinetic,
                                                                            lengths)))
     _act(system, geometry, touch, directions, law.forces)

@@ -56,6 +56,7 @@ class Watch:
     """A value that is looked at after a simulation and in statics.
 
     message   what it means if the value is below `least` or above `most`; {value} stands for the number found
+    summed    whether its integral over the time of a motion is looked at in place of the value; statics leaves it out
     """
 
     label: str
@@ -63,6 +64,7 @@ class Watch:
     least: float
     most: float
     message: str
+    summed: bool = False
 
 
 def nothing() -> Wrench:

@@ -37,7 +37,9 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
         found[there] = _rows(module, times[there], states[there], p, given)
         values[group] = found.reshape(*x[group].shape[:2], -1)
     messages = []
-    for (label, least, most, message), column in zip(about, np.moveaxis(values, -1, 0), strict=True):
+    for (label, least, most, message, summed), column in zip(about, np.moveaxis(values, -1, 0), strict=True):
+        if summed:
+            column = np.array([[np.trapezoid(row[there], t[there])] for row in column for there in [np.isfinite(row)]])
         low, high = np.fmin.reduce(column, axis=1), np.fmax.reduce(column, axis=1)
         wrong = np.flatnonzero((low < least) | (high > most))
         if len(wrong):

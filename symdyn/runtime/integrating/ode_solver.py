@@ -195,7 +195,7 @@ class CompiledSolver(OdeSolver):
         t, x = (np.array(part) for part in zip(*self._states, strict=True))
         request, module = self.run.request, self.module
         if module.metadata.watches:
-            warn(module, module.evaluate(WATCHES, t, x, request.p, request.inputs.rows(t, x)), "in this motion", 4)
+            warn(module, module.evaluate(WATCHES, t, x, request.p, request.inputs.rows(t, x)), "in this motion", 4, t)
         warn_near_lock(module, request, t, x, lambda part: integrate(module, part, self.setting.method), 4)
 
     def _dense_output_impl(self) -> WithinStep:

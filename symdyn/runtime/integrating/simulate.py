@@ -163,7 +163,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
         if metadata.watches and len(solution.t):
-            warn(module, solution.rows(WATCHES), "in this motion", 3)
+            warn(module, solution.rows(WATCHES), "in this motion", 3, solution.t)
         if metadata.charts:
             warn_near_lock(module, known, solution.t, solution.x,
                            lambda part: integrate(module, part, method), 3)

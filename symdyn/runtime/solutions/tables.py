@@ -164,7 +164,7 @@ def watches(solution: Solution) -> list[dict[str, Any]]:
         return []
     return [{"label": value.label, "least": number(value.low), "most": number(value.high),
              "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}
-            for value in watched(module, solution.rows(WATCHES))]
+            for value in watched(module, solution.rows(WATCHES), solution.t)]
 
 
 def _limits(least: float, most: float) -> str:

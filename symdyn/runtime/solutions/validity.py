@@ -38,19 +38,25 @@ class Watched:
         return self.meaning.replace("{value}", f"{worst:.4g}") if self.outside else ""
 
 
-def watched(module: Module, values: Any) -> list[Watched]:
-    """Of the function `watches` at one state or at rows of states."""
+def watched(module: Module, values: Any, t: np.ndarray | None = None) -> list[Watched]:
+    """Of the function `watches` at one state or at rows of states; t: their times, (n_t,), without which sums are left out."""
     about = module.metadata.watches
     rows = np.asarray(values, dtype=float).reshape(-1, len(about))
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    if not len(rows):
+    there = np.isfinite(rows).all(axis=1)
+    if not there.any():
         return []
-    return [Watched(label, least, most, float(column.min()), float(column.max()), message)
-            for (label, least, most, message), column in zip(about, rows.T, strict=True)]
+    found = []
+    for one, column in zip(about, rows[there].T, strict=True):
+        if one.summed:
+            if t is None:
+                continue
+            column = np.array([np.trapezoid(column, t[there])])
+        found.append(Watched(one.label, one.least, one.most, float(column.min()), float(column.max()), one.message))
+    return found
 
 
-def warn(module: Module, values: Any, when: str, level: int) -> None:
-    """Give a SimulationWarning for every value that is not as it is meant."""
-    for value in watched(module, values):
+def warn(module: Module, values: Any, when: str, level: int, t: np.ndarray | None = None) -> None:
+    """Give a SimulationWarning for every value that is not as it is meant; t: see `watched`."""
+    for value in watched(module, values, t):
         if value.outside:
             warnings.warn(f"{module.name}: {when}: {value.message}", SimulationWarning, stacklevel=level + 1)
