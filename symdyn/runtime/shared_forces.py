@@ -38,7 +38,8 @@ WORTH, ROUNDS, SMALLEST = 1e-3, 3, 1e-9
 PRESTRESS = 10.0
 
 
-_Part = tuple[np.ndarray, np.ndarray]
+# Of u_0^2 - |u_T|^2.
+SIGNS = np.array([1.0, -1.0, -1.0])
 
 
 class Cone(NamedTuple):
@@ -57,6 +58,18 @@ class Shared(NamedTuple):
     lam: np.ndarray
     margin: float
     softness: np.ndarray | None
+
+
+class _Parts(NamedTuple):
+    """Cones |u_T| <= u_0 of u = start + W v: start (n, 3), W (n, 3, n_v); rows that a cone does not have are zero."""
+
+    start: np.ndarray
+    W: np.ndarray
+
+    def at(self, v: np.ndarray) -> np.ndarray:
+        """u, (n, 3)."""
+        u: np.ndarray = self.start + self.W @ v
+        return u
 
 
 class _Null(NamedTuple):
@@ -127,33 +140,31 @@ def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tu
     """y and s of the largest margin by sizes f, and the softness of all rows."""
     n, normals = null.N.shape[1], [cone.normal for cone in cones if cone.normal is not None]
     # Of each cone u = [mu lam_N - s f; lam_T] = u_0 + W v.
-    parts: list[_Part] = []
-    for cone, size in zip(cones, sizes.tolist(), strict=True):
+    parts = _Parts(np.zeros((len(cones) + 1, 3)), np.zeros((len(cones) + 1, 3, n + 1)))
+    for k, cone in enumerate(cones):
         rows = list(cone.tangents)
-        W = np.zeros((1 + len(rows), n + 1))
         if cone.normal is not None:
-            W[0, :n] = cone.friction * null.N[cone.normal]
-        W[0, n], W[1:, :n] = -size, null.N[rows]
-        parts.append((np.append(_bound(null.lam_0, cone), null.lam_0[rows]), W))
+            parts.W[k, 0, :n] = cone.friction * null.N[cone.normal]
+        parts.W[k, 0, n], parts.W[k, 1:1 + len(rows), :n] = -sizes[k], null.N[rows]
+        parts.start[k, 0], parts.start[k, 1:1 + len(rows)] = _bound(null.lam_0, cone), null.lam_0[rows]
     # A prestress may raise normal forces, up to a bound.
     most = PRESTRESS * float(np.abs(null.lam_0).sum())
-    parts.append((np.array([most - null.lam_0[normals].sum()]), np.append(-null.N[normals].sum(axis=0), 0.0)[None, :]))
-    v = np.append(np.zeros(n), min((float(u[0]) - float(np.linalg.norm(u[1:]))) / size
-                                   for (u, _), size in zip(parts, sizes.tolist(), strict=False)) - 1.0)
+    parts.start[-1, 0], parts.W[-1, 0, :n] = most - null.lam_0[normals].sum(), -null.N[normals].sum(axis=0)
+    v = np.append(np.zeros(n), (_distances(parts.start[:-1]) / sizes).min() - 1.0)
     weight = 1.0
     while weight < LAST:
         weight = min(LAST, weight * LOWERED)
         v = _centred(parts, v, weight)
     # Of each cone the part of the margin that it is worth, and this by the tangential force: softness, up to a factor.
-    u = [u_0 + W @ v for u_0, W in parts]
-    worth = np.array([2 * one[0] / (weight * (one[0]**2 - one[1:] @ one[1:])) for one in u])
-    by_force = worth / np.array([one[0] for one in u])
+    u = parts.at(v)
+    worth = 2 * u[:, 0] / (weight * (u**2 @ SIGNS))
+    by_force = worth / u[:, 0]
     share = worth[:len(cones)] * sizes
     active = np.flatnonzero(share > WORTH * share.max())
     polished = _polished(parts, v, worth, active)
     if polished is not None:
         v, worth[active] = polished
-        sizes = np.array([np.linalg.norm((u_0 + W @ v)[1:]) for u_0, W in parts])
+        sizes = np.linalg.norm(parts.at(v)[:, 1:], axis=1)
         by_force[active] = worth[active] / np.maximum(sizes[active], 1e-300)
     softness, lam = np.ones(len(null.lam_0)), null.lam_0 + null.N @ v[:n]
     for k, cone in enumerate(cones):
@@ -163,7 +174,13 @@ def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tu
     return v[:n], float(v[n]), softness
 
 
-def _polished(parts: Sequence[_Part], v: np.ndarray, worth: np.ndarray,
+def _distances(u: np.ndarray) -> np.ndarray:
+    """u_0 - |u_T|, (n,)."""
+    found: np.ndarray = u[:, 0] - np.linalg.norm(u[:, 1:], axis=1)
+    return found
+
+
+def _polished(parts: _Parts, v: np.ndarray, worth: np.ndarray,
               active: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """The largest margin to rounding, by Newton's method for the conditions of optimality of the cones that it is of, with what
     each is worth; None where it comes to another set of cones."""
@@ -173,8 +190,8 @@ def _polished(parts: Sequence[_Part], v: np.ndarray, worth: np.ndarray,
         F, J = np.zeros(n + m), np.zeros((n + m, n + m))
         F[n - 1] = 1.0
         for j, k in enumerate(active.tolist()):
-            u_0, W = parts[k]
-            u = u_0 + W @ found
+            W = parts.W[k]
+            u = parts.start[k] + W @ found
             size = float(np.linalg.norm(u[1:]))
             slope = W[0].copy()
             if size > 0:
@@ -187,35 +204,27 @@ def _polished(parts: Sequence[_Part], v: np.ndarray, worth: np.ndarray,
         step = np.linalg.lstsq(J, -F, rcond=DEPENDENT)[0]
         found, w = found + step[:n], w + step[n:]
         if float(np.abs(step).max()) <= EXACT:
-            left = [float(u[0]) - float(np.linalg.norm(u[1:])) for u in (u_0 + W @ found for u_0, W in parts)]
-            return (found, w) if (w >= 0).all() and min(left) >= -EXACT else None
+            return (found, w) if (w >= 0).all() and _distances(parts.at(found)).min() >= -EXACT else None
     return None
 
 
-def _centred(parts: Sequence[_Part], v: np.ndarray, weight: float) -> np.ndarray:
+def _centred(parts: _Parts, v: np.ndarray, weight: float) -> np.ndarray:
     """The minimum of -weight s - sum of log(u_0^2 - |u_T|^2), by Newton's method from a point inside."""
     def value(v: np.ndarray) -> float:
-        total = -weight * float(v[-1])
-        for u_0, W in parts:
-            u = u_0 + W @ v
-            square = float(u[0]**2 - u[1:] @ u[1:])
-            if u[0] <= 0 or square <= 0:
-                return np.inf
-            total -= float(np.log(square))
-        return total
+        u = parts.at(v)
+        squares = u**2 @ SIGNS
+        inside = (u[:, 0] > 0).all() and (squares > 0).all()
+        return float(-weight * v[-1] - np.log(squares).sum()) if inside else np.inf
 
     last = np.inf
     for _ in range(STEPS):
-        gradient, H = np.zeros(len(v)), np.zeros((len(v), len(v)))
-        gradient[-1] = -weight
-        for u_0, W in parts:
-            u = u_0 + W @ v
-            turned = np.append(u[0], -u[1:])
-            square = float(turned @ u)
-            of = W.T @ turned
-            gradient -= 2 / square * of
-            signs = np.append(1.0, -np.ones(len(u) - 1))
-            H += 4 / square**2 * np.outer(of, of) - 2 / square * (W.T @ (signs[:, None] * W))
+        turned = parts.at(v) * SIGNS
+        squares = turned**2 @ SIGNS
+        scaled = np.einsum("kij,ki->kj", parts.W, turned) / squares[:, None]
+        gradient = -2 * scaled.sum(axis=0)
+        gradient[-1] -= weight
+        curved = parts.W * (SIGNS / squares[:, None])[:, :, None]
+        H = 4 * scaled.T @ scaled - 2 * np.einsum("kij,kil->jl", parts.W, curved)
         step = np.linalg.lstsq(H, -gradient, rcond=None)[0]
         falls = float(-gradient @ step)
         if falls < NEAR:  # where full steps are known to converge; values are rounding there
