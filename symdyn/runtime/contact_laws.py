@@ -27,6 +27,8 @@ from symdyn.runtime.shared_forces import DEPENDENT, MARGIN, Cone, shared_forces
 OPEN, STICKING, SLIDING = "open", "sticking", "sliding"
 # Inequalities hold to this part of the sizes of what stands in them.
 NOISE = 1e-9
+# Normal forces below this part of the largest do not press.
+LIGHT = 1e-6
 # Combinations of modes that are all solved, that are tried at most in a plane and in space, and that are solved at once.
 MOST_COMBINATIONS, MOST_TRIED, MOST_TRIED_IN_SPACE, AT_ONCE = 1024, 20_000, 100, 256
 # Steps of Newton's method for directions of slip, the angle that derivatives are taken over, rad.
@@ -83,7 +85,7 @@ class Mode:
     """What one contact does: OPEN, STICKING or SLIDING, the direction of its slip, whether its normal row holds.
 
     kept   whether it has the friction of SLIDING, but other contacts keep it from slipping; the direction is then longer than a
-           unit vector, so that kinetic friction times that is static friction
+           unit vector, so that kinetic friction times that is static friction, or zero where nothing presses it
     """
 
     kind: str
@@ -128,7 +130,7 @@ def _with_static_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], s
     found = []
     for one in _of_one_friction(D, b, [replace(site, kinetic=site.static) if k in steep else site
                                        for k, site in enumerate(sites)]):
-        slides = [k for k in steep if one.modes[k].kind == SLIDING]
+        slides = [k for k in steep if one.modes[k].kind == SLIDING and not one.modes[k].kept]
         kept = [k for k in slides if _may_be_kept(D, sites, k) and _is_kept(D, sites, one.modes, k)]
         slides = [k for k in slides if k not in kept]
         if slides:
@@ -401,13 +403,32 @@ class _Table:
             rows_of[list(site.rows)] = float(np.diag(self.D)[list(site.rows)].sum())
             if mode.held and mode.kind == STICKING and site.tangents:
                 cones.append(Cone(site.normal, tuple(site.tangents), site.static))
-            elif mode.held and site.normal is not None:
+            elif mode.held and site.normal is not None and (not mode.kept or mode.direction.any()):
                 cones.append(Cone(site.normal, (), 1.0))
         right = -(self.b + self.D @ fixed)[active]
         found = shared_forces((self.D @ H)[np.ix_(active, active)], right, H[:, active], fixed, rows_of[active], cones)
         if found.margin <= MARGIN or self.broken(only, found.lam[None], w[None]).any():
             return None
         return Solved(modes, found.lam, w, True, found.softness, found.softness is None)
+
+    def unloaded(self, lam: np.ndarray) -> list[int]:
+        """Sites that nothing presses in the only combination, whose rows depend on each other, however forces are shared; lam:
+        forces of least norm."""
+        from scipy.optimize import linprog
+
+        H, active = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.active))
+        _, s, V = np.linalg.svd((self.D @ H)[active > 0][:, active > 0])
+        places = [k for k, (site, (mode,)) in enumerate(zip(self.sites, self.options, strict=True))
+                  if site.normal is not None and mode.held]
+        normals, force = [self.sites[k].rows[0] for k in places], float(np.abs(lam).max(initial=0.0))
+        free = H[normals][:, active > 0] @ V[s <= DEPENDENT * s[:1]].T
+        if not places or not force or float(lam[normals].min()) > NOISE * force:
+            return []
+        # As many forces as can be: the largest sum of parts from 0 to 1, in LIGHT of the largest force, that are below them.
+        (n, m), most = free.shape, LIGHT * np.eye(len(places))
+        found = linprog(np.append(np.zeros(m), -np.ones(n)), np.hstack([-free, most]), np.maximum(lam[normals] / force, 0.0),
+                        bounds=[(None, None)] * m + [(0, 1)] * n)
+        return [k for k, part in zip(places, found.x[m:].tolist(), strict=True) if part < 0.5] if found.success else []
 
     def solved(self, combinations: Sequence[Sequence[int]]) -> list[Solved | None]:
         """The solution of each combination; None where it breaks an inequality."""
@@ -575,11 +596,11 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
         table, only = _Table(D, b, sites, [[m] for m in directed]), np.zeros((1, len(sites)), dtype=int)
         lam, w, exact, shared = table.linear(only)
         broken = table.broken(only, lam, w)[0]
-        if exact[0] and not broken.any():
-            return Solved(directed, lam[0], w[0], bool(shared[0]))
-        fitting = table.shared_out(lam[0], w[0]) if exact[0] and shared[0] else None
+        fitting = held(D, b, sites, directed) if exact[0] and shared[0] else None
         if fitting is not None:
             return fitting
+        if exact[0] and not broken.any():
+            return Solved(directed, lam[0], w[0], bool(shared[0]))
         if exact[0] and shared[0] and not unknown and not table.broken(only, forces[None, :], w).any() and np.abs(
                 b + D @ forces - w[0]).max() <= NOISE * table.size:
             return Solved(directed, forces, w[0], True)
@@ -594,10 +615,23 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
 
 def held(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], least: bool = True) -> Solved | None:
     """The solution with these modes, whose rows depend on each other, with forces that are within all cones of friction, of least
-    norm if these are and `least`; None where there is none."""
+    norm if these are and `least`; None where there is none. Contacts in space that nothing presses have no friction."""
     table, only = _Table(D, b, sites, [[m] for m in modes]), np.zeros((1, len(sites)), dtype=int)
     lam, w, exact, shared = table.linear(only)
-    return table.shared_out(lam[0], w[0], least) if exact[0] and shared[0] else None
+    if not exact[0] or not shared[0]:
+        return None
+    light = [k for k in table.unloaded(lam[0]) if modes[k].kind == STICKING and len(sites[k].tangents) == 2]
+    if not light:
+        return table.shared_out(lam[0], w[0], least)
+    without = [Mode(SLIDING, np.zeros(2), True, kept=True) if k in light else mode for k, mode in enumerate(modes)]
+    others = _Table(D, b, sites, [[m] for m in without])
+    lam, w, exact, shared = others.linear(only)
+    slips = np.abs(w[0][[row for k in light for row in sites[k].tangents]]).max() > NOISE * table.size
+    if not exact[0] or slips:
+        return None
+    if not least or others.broken(only, lam, w).any():
+        return others.shared_out(lam[0], w[0], least) if shared[0] else None
+    return Solved(tuple(without), lam[0], w[0], bool(shared[0]))
 
 
 def _other(site: Site, mode: Mode, lam: np.ndarray, w: np.ndarray) -> Mode:

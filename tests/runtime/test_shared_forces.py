@@ -1,5 +1,6 @@
 """Contacts in space that share forces: they slip where no distribution of forces holds them any more."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 import symdyn as sd
+from symdyn.errors import SimulationWarning
 from symdyn.runtime.contact_laws import SLIDING, STICKING
 from symdyn.runtime.shared_forces import Cone, shared_forces
 
@@ -53,6 +55,24 @@ def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(frictio
     kinetic = friction if isinstance(friction, float) else KINETIC
     after = RATE * ((begin + 1)**3 / 6 - begin**3 / 6 - begin**2 / 2) / MASS - kinetic * G / 2
     assert np.hypot(*solution.q[-1, :2]) == pytest.approx(after, rel=1e-7)
+
+
+@pytest.mark.parametrize(("legs", "push", "height"), [
+    ([(-0.2, 0), (0.2, 0), (0, 0.3)], (1, 0.3), -LOW), ([(-0.2, 0), (0.2, 0), (0.2, 0.3), (-0.2, 0.3)], (0, 1), -LOW),
+    ([(-0.2, 0), (0.2, 0), (0, 0.3)], (1, 0), -0.09)])
+def test_legs_that_nothing_presses_have_no_friction(legs: Any, push: Any, height: float) -> None:
+    """The weight is on the edge of two legs, which the others leave alone until the load presses them."""
+    force = RATE * np.array(push) / np.hypot(*push)
+    module, begin = table(legs, (*force, 0), (0, 0, height)), STATIC * MASS * G / RATE
+    solution = module.simulate(np.linspace(0, begin, 13), q=start(module), rtol=1e-10)
+    forces = np.array([contact.force for contact in solution.contacts.values()])
+    assert (np.linalg.norm(forces[:, :-1, 1:], axis=2) <= STATIC * forces[:, :-1, 0] + 1e-8 * MASS * G).all()  # softness
+    assert np.abs(solution.u).max() < 1e-9
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # of the border of two modes
+        solution = module.simulate((0, begin + 0.1), q=start(module), rtol=1e-10)
+    times = [contact.switches[1][0] for contact in list(solution.contacts.values())[:2]]
+    assert solution.success and times == pytest.approx([begin, begin], rel=1e-7)
 
 
 def test_twisted_body_slips_where_the_static_friction_of_all_legs_is_used() -> None:
@@ -109,7 +129,7 @@ def test_contacts_in_different_planes_end_the_run_where_their_shares_are_not_dec
     for k, y in enumerate((-0.1, 0.1)):
         system.add_contact(sd.Contact(f"side_{k}", top, "ground", shape=(sd.contacts.Point([-0.2, y, 0]), wall), friction=0.5))
     module = system.compile()
-    with pytest.warns(sd.errors.SimulationWarning, match=r"leg_3, side_0, side_1 stick and share forces; .* is not decided where "
+    with pytest.warns(SimulationWarning, match=r"leg_3, side_0, side_1 stick and share forces; .* is not decided where "
                                                          r"they are in different planes; fewer contacts"):
         solution = module.simulate((0, 6), q=start(module), rtol=1e-8)
     assert not solution.success and 1 < solution.t[-1] < 4.45 and np.abs(solution.u).max() < 1e-9
@@ -118,7 +138,7 @@ def test_contacts_in_different_planes_end_the_run_where_their_shares_are_not_dec
 def test_derivatives_end_where_legs_that_share_forces_slip() -> None:
     c = sd.parameters("c")
     module = table(force=(c, 0, 0), at=(0, 0, -0.05))
-    with pytest.warns(sd.errors.SimulationWarning, match="share forces and leave their cones"):
+    with pytest.warns(SimulationWarning, match="share forces and leave their cones"):
         solution = module.simulate((0, 3.5), q=start(module), params={c: RATE}, rtol=1e-8, sensitivities=[c])
     assert not solution.success and solution.t[-1] == pytest.approx(STATIC * MASS * G / RATE, rel=1e-6)
 

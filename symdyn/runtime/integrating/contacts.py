@@ -859,7 +859,8 @@ class _Phases:
                 continue
             if (abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0)) or (k in self.clutches and v < -TOUCHING):
                 closing.add(k)
-        hit = [k for k in closing if at.slip[self.normal[k]] < (-TOUCHING if start or k in self.clutches else 0.0)]
+        hit = [k for k in closing
+               if at.slip[self.normal[k]] < -(TOUCHING if start or k in self.clutches else self._rounding(at))]
         touching = [k for k, mode in enumerate(self.modes) if self.records[k].normal and (
             mode != OPEN or k in closing or (hit and k in self.clutches))]
         rebound: list[int] = []
@@ -895,7 +896,12 @@ class _Phases:
             return False
         speeds = x[self.module.metadata.sizes.q:self.request.n_state]
         fastest = max(float(np.abs(at.slip).max()), float(np.abs(speeds).max(initial=0.0)))
-        return bool(at.slip[self.normal[k]] >= -NO_SPEED * fastest and abs(at.gap[k]) <= LOWEST_FLIGHT * self.size)
+        none = max(NO_SPEED * fastest, self._rounding(at))
+        return bool(at.slip[self.normal[k]] >= -none and abs(at.gap[k]) <= LOWEST_FLIGHT * self.size)
+
+    def _rounding(self, at: Numbers) -> float:
+        """The speed that rounding of accelerations makes in the run, m/s, which hits nothing."""
+        return float(np.finfo(float).eps * np.abs(at.free).max(initial=0.0)) * self.begins.length
 
     def _ignored(self, t: float, x: np.ndarray) -> list[bool]:
         return ignored(self.module, t, x, self.request.p, self.request.inputs.at(t, x[:self.request.n_state]))
@@ -1021,18 +1027,27 @@ class _Phases:
 
     def _share_in_space(self, of: Sequence[int]) -> bool:
         """Whether contacts are some that stick in space and share forces."""
-        return self.shared and all(self.modes[k] == STICKING and self.records[k].tangents == 2 for k in of)
+        shared = self.shared or any(map(self._is_light, range(len(self.records))))
+        return shared and all(self.modes[k] == STICKING and self.records[k].tangents == 2 for k in of)
+
+    def _is_light(self, k: int) -> bool:
+        """Whether nothing pressed a contact in space when it was last looked at, so that it has no friction."""
+        return (self.modes[k] == SLIDING and self.still[k] and self.records[k].tangents == 2 and not self.directions[k].any())
 
     def _shares_again(self, t: float, x: np.ndarray) -> bool:
         """Whether contacts in space that stick and share forces hold by other shares than those with which some have left their
-        cones; these are taken then."""
+        cones; these are taken then. Those that nothing pressed before take their share."""
         at, closed = self._numbers(t, x), [k for k, mode in enumerate(self.modes) if mode != OPEN]
         places = [row for k in closed for row in self.rows[k]]
-        modes = [Mode(self.modes[k], self.directions[k], True, self.still[k] and self.modes[k] == SLIDING) for k in closed]
+        modes = [Mode(STICKING, np.zeros(2), True) if self._is_light(k) else
+                 Mode(self.modes[k], self.directions[k], True, self.still[k] and self.modes[k] == SLIDING) for k in closed]
         sites = self._sites(at, closed)
         one = held(at.D[np.ix_(places, places)], at.free[places], sites, modes, least=False)
         if one is None:
             return False
+        for k, mode in zip(closed, one.modes, strict=True):
+            self.modes[k] = mode.kind
+        self.shared = one.shared
         self._share(t, closed, one)
         return True
 
