@@ -150,11 +150,13 @@ class _Search:
 
 
 class _Position:
-    """A tree at random values of everything that it depends on; links are evaluated when they are first asked for."""
+    """A tree at random values of everything that it depends on, the same ones of parameters at all positions; links are evaluated
+    when they are first asked for."""
 
     def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = ()) -> None:
         self.tree, self.solid, self.own = tree, solid, own
         self.stream = random.Random(seed)
+        self.parameters = {parameter.name for parameter in tree.model.parameters}
         self.values = dict.fromkeys(tree.idle, 0.0)
         for joint in tree.model.joints:
             if isinstance(getattr(joint, "orientation", None), EulerParameters):
@@ -205,7 +207,9 @@ class _Position:
         """Arrays of nodes in numbers of 40 digits; parameters of the default 0 are 0."""
         tape = Tape.of(Recorder(), **{str(k): array for k, array in enumerate(arrays)})
         for leaf in tape.inputs:
-            self.values.setdefault(leaf.args[1], self.stream.uniform(0.5, 1.5))
+            name = leaf.args[1]
+            stream = random.Random(name) if name in self.parameters else self.stream
+            self.values.setdefault(name, stream.uniform(0.5, 1.5))
         return list(evaluate(tape, self.values, DIGITS).values())
 
 
