@@ -181,6 +181,51 @@ def test_tumbling_block_leaves_its_first_corner_whatever_rounding_makes_of_a_gap
             assert np.abs(solution.u[-1]).max() < 1e-9
 
 
+@pytest.fixture(scope="module", params=["c", "numpy"])
+def lifted(request: pytest.FixtureRequest) -> Module:
+    """A block on its floor that a force A sin(w t) lifts against drag."""
+    amplitude, rate = sd.parameters("A w")
+    system = ball()
+    system.add_joint_force("height", amplitude * sp.sin(rate * sd.t) - 0.2 * sd.coordinates("y").dot)
+    system.defaults.update({amplitude: 15, rate: 2})
+    return system.compile(backend=request.param)
+
+
+def test_block_is_lifted_where_nothing_but_its_own_force_accelerates_it(lifted: Module) -> None:
+    """At sin w t = m g/A, where its acceleration is zero but for rounding."""
+    stream = np.random.default_rng(0)
+    for amplitude, rate in zip(stream.uniform(11, 40, 20), stream.uniform(0.3, 8, 20), strict=True):
+        begin = np.arcsin(G / amplitude) / rate
+        solution = lifted.simulate((0, 1.2 * begin), params={"A": amplitude, "w": rate}, rtol=1e-9)
+        switches = solution.contacts["floor"].switches
+        assert [mode for _, mode in switches] == [SLIDING, OPEN] and switches[1][0] == pytest.approx(begin, abs=1e-9)
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_mass_leaves_a_sphere_at_the_height_that_its_speed_gives(backend: str) -> None:
+    """At y = 2/3 + v^2/(3 g r), from energy and m v^2/r = m g y."""
+    x, y = sd.coordinates("x y")
+    system = sd.System("hill", gravity=[0, -G])
+    carrier, body = system.add_body("carrier"), system.add_body("body", mass=0.7)
+    system.add_joint(sd.Prismatic("along", system.ground, carrier, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("across", carrier, body, axis=[0, 1], coordinate=y))
+    system.add_contact(sd.Contact("hill", body, system.ground, shape=(sd.contacts.Point(), sd.contacts.Sphere(1.0))))
+    module, stream = system.compile(backend=backend), np.random.default_rng(1)
+    for speed, digits in zip(stream.uniform(0.5, 2.5, 15), stream.uniform(8, 12, 15), strict=True):
+        solution = module.simulate((0, 1), q=[0, 1], u=[speed, 0], rtol=10**-digits)
+        assert [mode for _, mode in solution.contacts["hill"].switches] == [SLIDING, OPEN]
+        height = solution.events["hill_opens"].x[0, 1]
+        assert height == pytest.approx(2 / 3 + speed**2 / (3 * G), abs=1e3 * 10**-digits)
+
+
+def test_contact_that_pulls_as_its_opening_was_missed_stops_the_run(monkeypatch: pytest.MonkeyPatch, lifted: Module) -> None:
+    monkeypatch.setattr(contacts._Phases, "_looked_for", lambda self: np.zeros(len(self.module.metadata.events), dtype=bool))
+    with pytest.warns(SimulationWarning, match=r"contact floor pulls by 4\.17 N, since the instant at which it opened was missed; "
+                                               "give event_spacing, or a finer rtol"):
+        solution = lifted.simulate((0, 0.6), max_steps=1000)
+    assert not solution.success
+
+
 def test_block_lifts_off_a_shaken_table_in_every_period() -> None:
     """It leaves where a w^2 sin(w t) = g, with the acceleration zero, so that rounding passes the zero of the gap; and is back,
     without restitution, where its parabola meets the table."""

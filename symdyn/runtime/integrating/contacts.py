@@ -373,6 +373,7 @@ class _Phases:
         self.recent: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=MOST_SHORT)  # switches with their contacts
         self.ruled_out: dict[int, set[str]] = {}  # modes at this time
         self.unlooked: set[int] = set()
+        self.pressed = 0.0  # the largest force at the latest switch, N
         self.until = np.inf  # and until when these events are not looked for
         self.closing: set[int] = set()  # at the latest switch
         self.left: dict[int, float] = {}  # when contacts opened since nothing pressed them, or not any more
@@ -418,9 +419,11 @@ class _Phases:
                 if self.fired:
                     self.x = latest[-1].before.copy()
                 elif until >= last:
+                    self._demand_pressed(start, until, self.x)
                     break
                 else:
                     self.x, self.fired = self._slipped(until, self.x)
+                    self.fired = self.fired or self._passed_over(until, self.x)
                     if until == self.ends.begins and not self.fired:
                         self.x = self._into_last_stretch(until, self.x)
                 self._count(until - start, until, self.fired)
@@ -530,6 +533,32 @@ class _Phases:
                 what = "turns back" if k in self.clutches else "overlaps"
                 raise _Stop(f"contact {record.name} {what} by {-at.gap[k]:.3g}{' m' * (record.kind == BODIES)}, since the "
                             "instant at which it closed was missed; give event_spacing, or a finer rtol")
+
+    def _passed_over(self, t: float, x: np.ndarray) -> list[tuple[int, str]]:
+        """Contacts that have begun to pull while that was not looked for: they open now."""
+        passed = [k for k, own in enumerate(self.events) if self.modes[k] != OPEN and own.get("opens") in self.unlooked]
+        if not passed:
+            return []
+        forces = self._forces(t, x)
+        size = float(np.abs(forces).max(initial=0.0))
+        return [(k, "opens") for k in passed if forces[self.normal[k]] < -RESOLVED * size]
+
+    def _demand_pressed(self, start: float, t: float, x: np.ndarray) -> None:
+        """Raise _Stop where a closed contact pulls, at the end of a phase from start on."""
+        closed = [k for k, mode in enumerate(self.modes) if mode != OPEN and self.records[k].normal]
+        if not closed or self.shared or not self.pressed:
+            return
+        forces = self._forces(t, x)
+        size = max(float(np.abs(forces).max(initial=0.0)), self.pressed)
+        for k in closed:
+            if forces[self.normal[k]] < -MISSED * size:
+                raise _Stop(f"contact {self.records[k].name} pulls by {-forces[self.normal[k]]:.3g} N, since the instant at "
+                            "which it opened was missed; give event_spacing, or a finer rtol")
+
+    def _forces(self, t: float, x: np.ndarray, p: np.ndarray | None = None) -> np.ndarray:
+        """Of all rows, by parameters with modes; without, by those with the present ones."""
+        values = self._values(CONTACTS, t, x[:self.request.n_state], self._parameters() if p is None else p)
+        return _numbers_of(self.module.metadata, values).force
 
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note how often the modes change without time passing, and with less and less; raise _Stop where that does not end."""
@@ -899,6 +928,13 @@ class _Phases:
         none = max(NO_SPEED * fastest, self._rounding(at))
         return bool(at.slip[self.normal[k]] >= -none and abs(at.gap[k]) <= LOWEST_FLIGHT * self.size)
 
+    def _a_moment_later(self, t: float, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The time and the state after a part GRACE of the run, by the present modes."""
+        p, n = self._parameters(), self.request.n_state
+        after = min(GRACE * self.begins.length, self.request.span[1] - t)
+        f = self._values("rhs", t, x[:n], p)[:n]
+        return t + after, x[:n] + after / 2 * (f + self._values("rhs", t + after, x[:n] + after * f, p)[:n])
+
     def _rounding(self, at: Numbers) -> float:
         """The speed that rounding of accelerations makes in the run, m/s, which hits nothing."""
         return float(np.finfo(float).eps * np.abs(at.free).max(initial=0.0)) * self.begins.length
@@ -1081,12 +1117,12 @@ class _Phases:
         """The modes of the contacts that are closed, but those whose forces are at their bounds and go on beyond."""
         still, directions, doubts = list(self.still), list(self.directions), copy.deepcopy(self.doubts)
         for _ in closed:
-            beyond = self._beyond(t, x, at, self._choose(t, at, closed))
+            beyond = self._beyond(t, x, at, self._choose(t, x, at, closed))
             if not beyond:
                 return
             self._rule_out(at, beyond, self._kept())
             self.still, self.directions, self.doubts = list(still), list(directions), copy.deepcopy(doubts)
-        self._choose(t, at, closed)
+        self._choose(t, x, at, closed)
 
     def _beyond(self, t: float, x: np.ndarray, at: Numbers, forces: np.ndarray) -> list[tuple[int, str]]:
         """Contacts whose forces are beyond their bounds, by what the laws of contact take for rounding, and go on from there:
@@ -1117,11 +1153,14 @@ class _Phases:
             after *= LARGER
         return [one for one, goes in zip(watched, found.tolist(), strict=True) if goes]
 
-    def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> np.ndarray:
+    def _choose(self, t: float, x: np.ndarray, at: Numbers, closed: Sequence[int]) -> np.ndarray:
         """The modes of the contacts that are closed, from the accelerations; the others are open. The forces of all rows."""
         places = [row for k in closed for row in self.rows[k]]
         D, b = at.D[np.ix_(places, places)], at.free[places]
         found = solutions(D, b, self._sites(at, closed)) if places else []
+        if places and not found and self.ruled_out:  # an acceleration that begins at zero has the sign of rounding
+            later = self._numbers(*self._a_moment_later(t, x))
+            found = solutions(later.D[np.ix_(places, places)], later.free[places], self._sites(at, closed))
         if places and not found and self.ruled_out:
             self.ruled_out = {}
             found = solutions(D, b, self._sites(at, closed))
@@ -1155,6 +1194,7 @@ class _Phases:
         forces = np.zeros(len(at.free))
         if found:
             forces[places] = found[0].lam
+        self.pressed = float(np.abs(forces).max(initial=0.0))
         return forces
 
     def _doubt(self, kind: str, t: float, of: Sequence[int], text: str, weight: float = 0.0) -> None:
@@ -1200,7 +1240,7 @@ class _Phases:
 
     def _outside(self, t: float, x: np.ndarray, p: np.ndarray) -> list[tuple[int, str]]:
         """Contacts in space that share forces and have left their cones where nothing looked at these."""
-        force, found = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], p)).force, []
+        force, found = self._forces(t, x, p), []
         static = self._numbers(t, x).static
         for k, mode in enumerate(self.modes):
             if mode == STICKING and self.records[k].tangents == 2:
