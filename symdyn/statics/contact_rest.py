@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 NEAR = 1e-6
 # Iterations, and accelerations that count as none, by their sizes.
 ITERATIONS, BALANCED = 50, 1e-11
+# Steps of coordinates that are not halved any more.
+SHORTEST = 1e-3
 # Forces beyond their cone by less than this part of the largest are rounding; rounds of planes.
 WITHIN, ROUNDS = 1e-10, 20
 # The same where the end of a range is looked for.
@@ -187,7 +189,7 @@ def rest(module: Module, start: Any, params: Any, inputs: Any, t: float, contact
         contacts = {record.name: STICKING for record, gap in zip(metadata.contacts, at.gap, strict=True) if gap <= NEAR * size}
     x = _onto(module, time, x, p, free, contacts)
     p = with_modes(module, contacts, time, x, p, free)
-    x = _balanced(module, time, x, p, free)
+    x = _balanced(module, time, x, p, free, contacts)
     at = numbers(module, time, x, p, free)
     deep = [record.name for record, gap in zip(metadata.contacts, at.gap, strict=True) if gap < -NEAR * size]
     if deep:
@@ -211,9 +213,9 @@ def _onto(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.nda
     return normalised(module, x)
 
 
-def _balanced(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """The position near one where nothing accelerates, with closed contacts closed and sticking ones where they are: Newton's
-    method. Raises NoEquilibrium where there is none."""
+def _balanced(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray, contacts: Any) -> np.ndarray:
+    """The position near one where nothing accelerates, with closed contacts closed and sticking ones where they are or
+    roll to: Newton's method. Raises NoEquilibrium where there is none."""
     metadata = module.metadata
     n_q, n_u = metadata.sizes.q, metadata.sizes.u
     held, x = held_places(module, p), x.copy()
@@ -230,11 +232,23 @@ def _balanced(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np
         rows = np.vstack([J[n_q:n_q + n_u, :n_q] @ N, (M @ at.speeds[:, held]).T])
         step = np.linalg.lstsq(rows, -np.concatenate([left, np.zeros(len(held))]), rcond=1e-12)[0]
         scale = min(1.0, 0.5 / max(float(np.abs(step).max(initial=0.0)), 1e-300))
-        x[:n_q] += N @ step * scale
-        x = normalised(module, x)
+        x = _moved(module, t, x, N @ step * scale, p, inputs, contacts)
     names = ", ".join(f"{name} by {value:.4g}" for name, value in zip(metadata.u, left, strict=True) if abs(value) > 1e-6 * size)
     raise NoEquilibrium(f"{module.name}: no state of rest with these contacts: what accelerates is {names} a second; name in "
                         "contacts those that carry, or begin elsewhere")
+
+
+def _moved(module: Module, t: float, x: np.ndarray, step: np.ndarray, p: np.ndarray, inputs: np.ndarray,
+           contacts: Any) -> np.ndarray:
+    """The position after a step, or a part of it from which closed contacts are closed again."""
+    there = x.copy()
+    there[:len(step)] += step
+    try:
+        return _onto(module, t, normalised(module, there), p, inputs, contacts)
+    except EvaluationError:  # so deep in a surface that a shape touches it in several places
+        if np.abs(step).max() < SHORTEST:
+            raise
+        return _moved(module, t, x, step / 2, p, inputs, contacts)
 
 
 def _open(module: Module, p: np.ndarray) -> np.ndarray:

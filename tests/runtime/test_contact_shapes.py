@@ -330,7 +330,7 @@ def test_heights_that_cannot_be_are_rejected(graph: Any, message: str) -> None:
 
 def test_languages_that_a_touching_point_has_no_text_for_are_reported() -> None:
     equations = ball((SPHERE, Shapes.Surface(WAVES, X, Y))).embedding()
-    with pytest.raises(sd.SymdynError, match=r"touch_touching\(c_x, c_y, radius\) has no text for the backend fortran"):
+    with pytest.raises(sd.SymdynError, match=r"touching_touch\(c_x, c_y, radius\) has no text for the backend fortran"):
         emit(equations, "fortran", ["rhs"])
 
 

@@ -56,6 +56,22 @@ def test_pushed_box_slides_or_tips_over(box: Any, mu: float) -> None:
     assert found.range("force") == (pytest.approx(-limit, rel=1e-12), pytest.approx(limit, rel=1e-12))
 
 
+@pytest.mark.parametrize("graph", [sd.contacts.Bore(1.0, [0, 1]), sd.contacts.Curve(1 - sp.sqrt(1 - sp.Symbol("x")**2),
+                                                                                    sp.Symbol("x"))])
+def test_ball_in_a_bowl_that_is_tilted_rolls_to_where_it_rests(graph: Any) -> None:
+    """At (R - r) sin(tilt) from the middle of the bowl, turned by the way over its radius, wherever the search begins."""
+    system = sd.System("bowl", gravity=[G * sp.sin(TILT), -G * sp.cos(TILT)])
+    system.defaults[TILT] = 0.3
+    ball = system.add_body("ball", mass=0.5, inertia=0.0025)
+    system.add_joint(sd.Planar("free", system.ground, ball, sd.coordinates("x y theta")))
+    system.add_contact(sd.Contact("bowl", ball, system.ground, shape=(sd.contacts.Sphere(0.1), graph), friction=0.5))
+    module = system.compile()
+    at = 0.9 * np.sin(0.3)
+    for begin in (0.05, at - 1e-3, at - 1e-6, at):
+        found = module.rest({"x": begin, "y": 1 - np.sqrt(0.9**2 - begin**2)})
+        assert found.x[:2] == pytest.approx([at, 1 - 0.9 * np.cos(0.3)], abs=1e-12) and found.verdict == "neutral"
+
+
 def test_box_on_one_corner_is_an_unstable_equilibrium(box: Any) -> None:
     """The rocking frequency about a corner: m g R/(I + m R^2), with the centre above it."""
     reach = np.hypot(0.2, 0.1)

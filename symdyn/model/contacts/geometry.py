@@ -283,7 +283,7 @@ class Geometry:
                spline: Spline | None = None) -> tuple[tuple[sp.Expr, ...], Spline | None] | None:
         """The unknowns of a touching point as functions of what is given; None, with a fault, where they have no text."""
         try:
-            found, together = touching_of(f"{self.contact.name}_touching", f"contact {self.contact.name}: the {what}", implicit,
+            found, together = touching_of(f"touching_{self.contact.name}", f"contact {self.contact.name}: the {what}", implicit,
                                           spline)
         except UnsupportedExpression as error:
             self.faults.append(f"{self.contact.where}: {error}")

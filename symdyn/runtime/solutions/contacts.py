@@ -43,7 +43,8 @@ class ContactMotion(NamedTuple):
     force     on body a along the normal, then along the tangents, N, (n_t, 1 + n_tangents); zero where it is open; of a joint the
               torque, N m, or force, N, of friction without a normal one
     slip      velocity of body a against body b along the tangents, m/s, (n_t, n_tangents)
-    impulse   sum of the impulses since the start, N s, (n_t, 1 + n_tangents)
+    impulse   sum of the impulses since the start, N s, (n_t, 1 + n_tangents): those of impacts; by time stepping, which
+              does not separate impacts from forces, of both; of a compliant contact, whose forces are finite, zero
     impacts   one by one, see Impacts
     rests     times at which infinitely many impacts have come to their end, s, (n,)
     switches  times from which on the contact is in another mode, with that mode; of a compliant one as far as times were stored
