@@ -55,15 +55,23 @@ def reading(path: Path) -> Iterator[Any]:
         yield archive
 
 
+def pieces(path: Path, name: str, rows: int) -> Iterator[np.ndarray]:
+    """An array of an archive, so many rows at a time, without holding all of it."""
+    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
+        np.lib.format.read_magic(member)  # type: ignore[arg-type]
+        shape, _, dtype = np.lib.format.read_array_header_1_0(member)  # type: ignore[arg-type]
+        row = int(np.prod(shape[1:])) * dtype.itemsize
+        for first in range(0, shape[0], rows):
+            n = min(rows, shape[0] - first)
+            yield np.frombuffer(member.read(n * row), dtype).reshape(n, *shape[1:])
+
+
 def thinned(path: Path, name: str, step: int) -> np.ndarray:
     """Every `step`-th row of an array, without holding all of it."""
     with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
         np.lib.format.read_magic(member)  # type: ignore[arg-type]
         shape, _, dtype = np.lib.format.read_array_header_1_0(member)  # type: ignore[arg-type]
-        row = int(np.prod(shape[1:])) * dtype.itemsize
-        at_once = step * max(1, PIECE // (step * max(1, row)))
-        kept = [np.zeros((0, *shape[1:]), dtype)]
-        for first in range(0, shape[0], at_once):
-            n = min(at_once, shape[0] - first)
-            kept.append(np.frombuffer(member.read(n * row), dtype).reshape(n, *shape[1:])[::step].copy())
+    row = int(np.prod(shape[1:])) * dtype.itemsize
+    at_once = step * max(1, PIECE // (step * max(1, row)))
+    kept = [np.zeros((0, *shape[1:]), dtype), *(piece[::step].copy() for piece in pieces(path, name, at_once))]
     return np.concatenate(kept)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import socket
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -75,6 +77,7 @@ class Chunk:
 class Done:
     """Outcomes of a chunk: label -> (n, ...), not a number for members that failed; (place in the chunk, message) of these.
 
+    worker   the process that computed it
     doubts   (number of the member, what its motion was warned of) where outcomes are derivatives, the first few; n_doubtful: how
              many members there are
     """
@@ -84,6 +87,7 @@ class Done:
     failures: list[tuple[int, str]] = field(default_factory=list)
     doubts: list[tuple[int, str]] = field(default_factory=list)
     n_doubtful: int = 0
+    worker: str = field(default_factory=lambda: f"{socket.gethostname()}-{os.getpid()}")
 
     def fail(self, place: int, error: Exception) -> None:
         """Note a failed member, and leave its row empty."""

@@ -21,15 +21,15 @@ class ExecutorFailed(SymdynError):
 
 
 def run_chunks(todo: Iterator[Chunk], make: Callable[[], Executor], again: bool,
-               outstanding: int | None = None) -> Iterator[Done]:
+               outstanding: int | None = None, ahead: int = AHEAD) -> Iterator[Done]:
     """Outcomes of the chunks, in the order in which they are done.
 
     make          gives the executor; after it has died it is asked for another one if `again`
-    outstanding   chunks that are handed over at a time; default: three for every worker
+    outstanding   chunks that are handed over at a time; default: `ahead` for every worker
     Raises ExecutorFailed where there is no other executor, and where a chunk has failed ATTEMPTS times.
     """
     executor, born = make(), 0
-    limit = outstanding or AHEAD * _workers(executor)
+    limit = outstanding or ahead * _workers(executor)
     back: list[Chunk] = []
     attempts: dict[int, int] = {}
     pending: dict[Future[Done], tuple[Chunk, int]] = {}

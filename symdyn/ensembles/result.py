@@ -95,6 +95,40 @@ class Ensemble:
 
         return draw(self, path, scatter)
 
+    def to_parquet(self, path: PathName | None = None) -> Path:
+        """Write a Parquet table with a row for each member: what was sampled, outcomes, `failed`; outcomes that are arrays are
+        lists. The rows are read and written in groups, so that memory does not grow with their number. Returns the path of the
+        file, by default ensemble.parquet next to ensemble.npz. Raises MissingExtra without pyarrow.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+        >>> found.to_parquet().name
+        'ensemble.parquet'
+        """
+        from symdyn.ensembles.exports import EXPORTS, write_parquet
+
+        path = Path(path) if path is not None else self.path / EXPORTS["parquet"].file
+        write_parquet(self, path)
+        return path
+
+    def to_zarr(self, path: PathName | None = None) -> Path:
+        """Write a Zarr folder of arrays, as `xarray.open_zarr(path, consolidated=False)` reads it: samples, every outcome, failed, over the axes member and
+        t. The rows are read and written in pieces. Returns the path, by default ensemble.zarr next to ensemble.npz; a folder that
+        is there is replaced. Raises MissingExtra without zarr.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["trace q1"], path=tempfile.mkdtemp())
+        >>> found.to_zarr().name
+        'ensemble.zarr'
+        """
+        from symdyn.ensembles.exports import EXPORTS, write_zarr
+
+        path = Path(path) if path is not None else self.path / EXPORTS["zarr"].file
+        write_zarr(self, path)
+        return path
+
     def __repr__(self) -> str:
         failed = f", {self.n_failed} failed" if self.n_failed else ""
         return f"<Ensemble of {self.name}: {counted(self.count, 'member')}{failed}, {', '.join(self.labels)} in {self.file}>"

@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import itertools
 import os
+import random
 import shutil
 import tempfile
 import time as clock
 import warnings
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from symdyn.backend.right_side import METHOD, RightSide
-from symdyn.ensembles.chunk import LISTED, Chunk, Setting, motion, quiet, setting_of, vectors_serve
-from symdyn.ensembles.code import fingerprint
-from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
+from symdyn.ensembles.chunk import LISTED, Chunk, quiet
+from symdyn.ensembles.claims import ATTEMPTS, BEATS, LEASE, Claims, Heartbeat
+from symdyn.ensembles.dispatch import AHEAD, ExecutorFailed, run_chunks
+from symdyn.ensembles.exports import EXPORTS, demand_formats
 from symdyn.ensembles.lock import OneRun
-from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
-from symdyn.ensembles.portable import PortableModule, of_contacts
+from symdyn.ensembles.plan import Plan, plan, whole
+from symdyn.ensembles.progress import Progress, own_name
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
-from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped, SimulationWarning
+from symdyn.errors import ArgumentError, EnsembleStopped, SimulationWarning
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
-from symdyn.runtime.batches.on_device import demand_fit
-from symdyn.runtime.batches.states import UNIT
-from symdyn.runtime.gpu import device as devices
-from symdyn.runtime.inputs.inputs import varies_over_time
-from symdyn.runtime.integrating.events import wanted
-from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 
@@ -47,23 +42,21 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
     from symdyn.runtime.module import InputValues
 
-# Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
-CHUNK, CHUNK_OF_DEVICE, PARTS = 1000, 100_000, 16
-# Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
-TRIED = 8
-# From so many samples on it is worth compiling code that integrates several motions at once.
-VECTORS_FROM = 2000
+# The piece of work, next to the chunks, that puts these together.
+MERGE = "merge"
+# Seconds between looks at what others are doing, for workers that wait for them.
+LOOK = 1.0
 
 
 def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times | None = None, outcomes: Any = None, *,
              q: Values | None = None, u: Values | None = None, z: Values | None = None, params: Values | None = None,
              inputs: InputValues | None = None, executor: Any = None, chunk: int | None = None, path: PathName | None = None,
-             resume: bool = False, progress: bool = False, consistent: bool = False, outstanding: int | None = None,
-             functions: tuple[str, ...] = (), rtol: float | None = None, atol: float | Row | None = None,
-             method: str | type | None = None, max_step: float | None = None, first_step: float | None = None,
-             max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
-             events: bool | str | Sequence[str] | None = None, event_spacing: float | None = None,
-             sensitivities: Names | None = None, device: str = "cpu") -> Ensemble:
+             resume: bool = False, shared: bool = False, formats: Names = (), progress: bool = False, consistent: bool = False,
+             outstanding: int | None = None, functions: tuple[str, ...] = (), rtol: float | None = None,
+             atol: float | Row | None = None, method: str | type | None = None, max_step: float | None = None,
+             first_step: float | None = None, max_steps: int | None = None,
+             stabilization: str | tuple[str, float] | None = None, events: bool | str | Sequence[str] | None = None,
+             event_spacing: float | None = None, sensitivities: Names | None = None, device: str = "cpu") -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -79,12 +72,16 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     executor    any concurrent.futures.Executor, or a function that makes one, which is called again if it dies. Processes and
                 machines get the generated code as text and compile it once. Default: a thread for every core; compiled code lets
                 others run meanwhile
-    chunk       samples that are computed together, and written together; default: 1000, of few samples a sixteenth
+    chunk       samples that are computed together, and written together; default: 1000, of few samples a sixteenth, of more
+                than ten millions as many as make ten thousand chunks, of 64 MB at most
     path        folder for results, written as they come; default: a temporary one, removed with the result
     resume      go on with a run that was stopped, whatever stopped it; the result is the same, to the byte
+    shared      processes on any machines that make this call with the same path share the work: each computes chunks that no
+                other one has, and what a process that was killed had begun is taken over. All return the whole result
+    formats     files that are written next to ensemble.npz: "parquet", "zarr"; see Ensemble.to_parquet and to_zarr
     progress    show a bar (needs tqdm)
     consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
-    outstanding chunks that are handed to the executor at a time; default: three for every worker
+    outstanding chunks that are handed to the executor at a time; default: three for every worker, one where work is shared
     functions   of the module that functions of a Solution call in other processes only
     rtol, atol, method, max_step, first_step, max_steps, stabilization, events, event_spacing   of `simulate`; None: as there
     sensitivities   what outcomes with "grad" are by, as for `simulate`: parameters, inputs, and initial values as "q1(0)";
@@ -96,7 +93,7 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     that fails has no numbers in its row, and is listed in `failures`. Warnings of single motions are not given, but one
     SimulationWarning reports members whose derivatives are outcomes and were warned of. Returns an Ensemble. Raises
     ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an executor died or
-    the disk is full: what was done is kept, if there is a path.
+    the disk is full: what was done is kept, if there is a path; MissingExtra where a format needs a package.
 
     >>> import tempfile
     >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -104,40 +101,24 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     >>> found["end q1"].round(4)
     array([-1.9705, -1.491 ])
     """
-    resume, progress, consistent = (flag(v, f"an ensemble: {what}") for v, what in (
-        (resume, "resume"), (progress, "progress"), (consistent, "consistent")))
-    module = system if isinstance(system, Module) else system.compile() if hasattr(system, "compile") else None
-    if module is None:
-        raise ArgumentError(f"an ensemble needs a Module or a System, found {shown(system, 80)}")
-    drawn = samples if isinstance(samples, Samples) else Samples(samples, "paired")
-    asked = {"rtol": rtol, "atol": atol, "method": method, "max_step": max_step, "first_step": first_step,
-             "max_steps": max_steps, "stabilization": stabilization, "events": events, "event_spacing": event_spacing}
-    options = {name: value for name, value in asked.items() if value is not None}
-    measures = take_measures(outcomes, module)
-    options |= _derivatives(module, drawn, measures, sensitivities)
-    times = output_times(t, measures, module)
-    gpu = devices.device_number(device, module.name)
-    if gpu is not None:
-        _check_device(module, gpu, options, consistent)
-    vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options))
-    together = [UNIT if gpu is None else RightSide(method=str(options.get("method", METHOD)), threads=True)] if vectors else []
-    portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions, *together])
-    given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
-    if varies_over_time(inputs):
-        raise ArgumentError(f"{module.name}: an ensemble takes numbers as inputs, found {shown(inputs, 80)}; write what goes "
-                            "over time as an expression in sd.t, with parameters that samples may change, or run "
-                            "module.simulate_batch, which takes functions, splines and tables")
-    setting = setting_of(portable, drawn.names, times, measures, given, consistent, options)
-    setting = replace(setting, vectors=vectors, device="cpu" if gpu is None else device)
-    size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)
+    resume, shared, progress = (flag(v, f"an ensemble: {what}") for v, what in (
+        (resume, "resume"), (shared, "shared"), (progress, "progress")))
+    asked = plan(system, samples, t, outcomes, q=q, u=u, z=z, params=params, inputs=inputs, chunk=chunk, consistent=consistent,
+                 functions=functions, sensitivities=sensitivities, device=device, rtol=rtol, atol=atol, method=method,
+                 max_step=max_step, first_step=first_step, max_steps=max_steps, stabilization=stabilization, events=events,
+                 event_spacing=event_spacing)
+    module: Module = asked.setting.system.module
+    how = How(executor, whole(outstanding, "outstanding", module), progress, demand_formats(formats, module.name),
+              LEASE if shared else None)
+    if shared and path is None:
+        raise ArgumentError(f"{module.name}: shared=True without a path; pass that of a folder that all processes reach")
     if path is not None:
         if not isinstance(path, (str, Path)) or "\0" in str(path):
             raise ArgumentError(f"{module.name}: the path is {shown(path)}; pass that of a folder, as text or a Path")
-        with OneRun(Path(path)):
-            return _told(_in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True))
+        return run(asked, Path(path), how, resume)
     folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
     try:
-        result = _told(_in_folder(folder, setting, drawn, executor, size, ahead, False, progress, False))
+        result = _warned(_in_folder(asked, folder, how, False, False))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -145,107 +126,230 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     return result
 
 
-def _check_device(module: Module, number: int, options: Mapping[str, Any], consistent: bool) -> None:
-    """Raises ArgumentError for what a device does not take, and where it is not there; MissingExtra."""
-    others = {name: value for name, value in options.items() if name not in ("events", "event_spacing")}
-    demand_fit(module, options.get("method", METHOD), None, others, bool(wanted(module, options.get("events", True)).any()))
-    if consistent:
-        raise ArgumentError(f"{module.name}: device='gpu' takes starts as they are; leave consistent out, or sample starts that "
-                            "fulfil the constraints")
-    devices.open_device(number, module.name).close()
+@dataclass(frozen=True)
+class How:
+    """Who computes an ensemble, and what is written.
+
+    outstanding   chunks that are handed to the executor at a time; None: by its workers
+    lease         seconds without a sign of life after which the chunks of a worker go to others; None: work is not shared
+    stays         a worker that finds nothing to do waits for the others, and takes over what they leave
+    """
+
+    executor: Any = None
+    outstanding: int | None = None
+    progress: bool = False
+    formats: tuple[str, ...] = ()
+    lease: float | None = None
+    stays: bool = True
 
 
-def _told(result: Ensemble) -> Ensemble:
+def run(asked: Plan, folder: Path, how: How, resume: bool) -> Ensemble:
+    """Compute what is not there yet; see `ensemble`. Raises StillAtWork if work is shared, and others have not done yet what is
+    left, unless `how.stays`."""
+    with OneRun(folder, how.lease is not None):
+        return _warned(_in_folder(asked, folder, how, resume or how.lease is not None, True))
+
+
+class StillAtWork(Exception):
+    """Nothing is left for this worker, but others have not completed what they have."""
+
+
+def prepare(asked: Plan, folder: Path, resume: bool) -> tuple[Plan, Store]:
+    """Try some samples, and write down what is asked for in the folder, unless that stands there.
+
+    Raises ArgumentError where a folder holds something else; OSError as the disk does.
+    """
+    found = check_folder(folder, resume)
+    asked = asked.tried()
+    size = asked.size or (found or {}).get("chunk") or asked.chunk_size()
+    manifest = asked.manifest(size)
+    if found is None:
+        write_manifest(folder, manifest)
+        found = check_folder(folder, True) or {}  # another worker may have been faster
+    check_same(folder, found, manifest)
+    return asked, Store(folder, asked.samples.count, size, asked.columns)
+
+
+def _warned(result: Ensemble) -> Ensemble:
     """The same, after a warning of what is doubtful in it."""
     if result.doubts:
-        warnings.warn(f"{result.name}: {result.doubts}", SimulationWarning, stacklevel=3)
+        warnings.warn(f"{result.name}: {result.doubts}", SimulationWarning, stacklevel=4)
     return result
 
 
-def _derivatives(module: Module, samples: Samples, measures: Sequence[Measure], given: Any) -> dict[str, Any]:
-    """The option of `simulate` with what outcomes are differentiated by. Raises ArgumentError with all that is wrong."""
-    if not any(m.grad for m in measures):
-        if given is not None:
-            raise ArgumentError(f"{module.name}: sensitivities were given, but no outcome is a derivative; write 'grad end "
-                                f"{module.metadata.x[0]}' or the like, or leave them out")
-        return {}
-    faults: list[str] = []
-    by = given if given is not None else [f"{n}(0)" if n in module.metadata.x else n for n in samples.names]
-    names = tuple(names_of(module, by, faults))
-    if faults:
-        raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
-    return {"sensitivities": names}
-
-
-def _in_folder(folder: Path, setting: Setting, samples: Samples, executor: Any, size: int | None, ahead: int | None,
-               resume: bool, progress: bool, lasting: bool) -> Ensemble:
-    found = check_folder(folder, resume)
-    largest = CHUNK if setting.device == "cpu" else CHUNK_OF_DEVICE
-    size = size or (found or {}).get("chunk") or min(largest, -(-samples.count // PARTS))
+def _in_folder(asked: Plan, folder: Path, how: How, resume: bool, lasting: bool) -> Ensemble:
+    try:
+        asked, store = prepare(asked, folder, resume)
+    except OSError as error:
+        raise EnsembleStopped(f"{asked.name}: the ensemble stopped: {_of_disk(error)}; nothing was computed", 0,
+                              asked.samples.count) from error
     with quiet():
-        setting = _tried(setting, samples)
-        manifest = _manifest(setting, samples, size)
-        if found is not None:
-            check_same(folder, found, manifest)
-        store = Store(folder, samples.count, size, dict(zip([m.label for m in setting.measures], setting.shapes)))
-        run = _Run(store, setting, samples, executor, ahead, progress, lasting)
-        if found is None:
-            run.kept(lambda: write_manifest(folder, manifest))
-        return run.go()
+        return _Run(store, asked, how, lasting).go()
+
+
+def _of_disk(error: OSError) -> str:
+    """What the disk rejects, in words."""
+    why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "results cannot be written"
+    return f"{why} ({error})"
 
 
 class _Run:
-    """One run, with all that it needs to go on."""
+    """One run, with all that it needs to go on.
 
-    def __init__(self, store: Store, setting: Setting, samples: Samples, executor: Any, outstanding: int | None,
-                 progress: bool, lasting: bool) -> None:
-        self.store, self.setting, self.samples = store, setting, samples
-        self.executor, self.outstanding, self.progress, self.lasting = executor, outstanding, progress, lasting
+    claims   of this worker, if work is shared
+    shown    what it has done, for whoever looks
+    """
+
+    def __init__(self, store: Store, asked: Plan, how: How, lasting: bool) -> None:
+        self.store, self.plan, self.how, self.lasting = store, asked, how, lasting
         self.n_done = 0
         self.n_doubtful, self.doubts = 0, list[tuple[int, str]]()
+        name = own_name()
+        self.claims = None if how.lease is None else Claims(store.folder, name, how.lease)
+        self.shown = Progress(store.folder, name)
+        self.bar: Any = None
 
     def go(self) -> Ensemble:
         begun, store = clock.perf_counter(), self.store
         if store.complete():
+            self.kept(self._finish)
+            store.clear()
             return Ensemble(store.folder, store.count)
-        there = self.kept(store.begin)
-        self.n_done = n_before = sum(store.samples_in(k) for k in there)
-        todo = (self._chunk(k) for k in range(store.n_chunks) if k not in there)
-        make, again, own = self._executors()
-        bar = _bar(self.setting.system.module.name, store.count, n_before) if self.progress else None
-        arriving = run_chunks(todo, make, again, self.outstanding)
+        there = self.kept(lambda: store.begin(self.claims is not None))
+        self.n_done = n_before = self._count(there)
+        self.bar = _bar(self.plan.name, store.count, n_before) if self.how.progress else None
         try:
-            for done in arriving:
-                self.kept(lambda done=done: store.put(done))  # type: ignore[misc]
-                self.n_done += store.samples_in(done.index)
-                self.n_doubtful += done.n_doubtful
-                self.doubts = sorted([*self.doubts, *done.doubts])[:LISTED]
-                if bar is not None:
-                    bar.update(store.samples_in(done.index))
+            with self._visible():
+                if self.claims is None:
+                    self._compute(self.plan.chunk(k, store.size) for k in range(store.n_chunks) if k not in there)
+                    self.kept(self._finish)
+                else:
+                    self._share(self.claims)
         except ExecutorFailed as error:
             raise self._stopped(str(error)) from error
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"interrupted; {self._what_is_kept()}") from None
         finally:
+            if self.bar is not None:
+                self.bar.close()
+        store.clear()
+        return Ensemble(store.folder, n_before, clock.perf_counter() - begun, self._doubts())
+
+    @contextlib.contextmanager
+    def _visible(self) -> Iterator[None]:
+        """Show that this worker is alive, and what it has done."""
+        def beat() -> None:
+            if self.claims is not None:
+                self.claims.touch()
+            self.shown.write()
+
+        if not self.lasting:
+            yield
+            return
+        self.kept(self.shown.begin)
+        try:
+            with self.claims or contextlib.nullcontext(), Heartbeat((self.how.lease or LEASE) / BEATS, beat):
+                yield
+        finally:
+            self.shown.write("has left")
+
+    def _share(self, claims: Claims) -> None:
+        """Compute what no other worker has, until all is there and put together."""
+        while not self._complete():
+            self._compute(self._claimed(claims))
+            if len(self.store.there()) == self.store.n_chunks:
+                if claims.take([MERGE]) is not None and not self._complete():
+                    if not self.store.drop_damaged():
+                        self.shown.write("merging")
+                        self.kept(self._finish)
+                    claims.release(MERGE)
+                    continue
+            elif lost := claims.given_up():
+                raise ExecutorFailed(f"{ATTEMPTS} workers ended while they computed {self._members(lost[0])}, which nobody tries "
+                                     "again: their memory or their time may not suffice; start again with fewer samples in a "
+                                     "chunk, more memory or more time")
+            if not self.how.stays:
+                raise StillAtWork(self._what_is_kept())
+            clock.sleep(LOOK)
+
+    def _claimed(self, claims: Claims) -> Iterator[Chunk]:
+        """Chunks that this worker has claimed, as long as there are any; each begins somewhere else, so that few try the same."""
+        while True:
+            there = self.store.there()
+            if self.bar is not None:  # of all workers
+                self.bar.update(self._count(there) - self.bar.n)
+            left = [f"{k:08d}" for k in range(self.store.n_chunks) if k not in there]
+            cut = random.randrange(len(left)) if left else 0
+            piece = claims.take([*left[cut:], *left[:cut]])
+            if piece is None:
+                return
+            if int(piece) in self.store.there():  # another worker kept it between the two looks
+                claims.release(piece)
+                continue
+            yield self.plan.chunk(int(piece), self.store.size)
+
+    def _compute(self, todo: Iterator[Chunk]) -> None:
+        """Compute chunks, and keep them."""
+        first = next(todo, None)
+        if first is None:
+            return
+        make, again, own = self._executors()
+        arriving = run_chunks(itertools.chain([first], todo), make, again, self.how.outstanding,
+                              AHEAD if self.claims is None else 1)
+        wait = True
+        try:
+            for done in arriving:
+                self.kept(lambda done=done: self.store.put(done))  # type: ignore[misc]
+                n = self.store.samples_in(done.index)
+                self.n_done += n
+                self.shown.add(done, n)
+                self.n_doubtful += done.n_doubtful
+                self.doubts = sorted([*self.doubts, *done.doubts])[:LISTED]
+                if self.claims is not None:
+                    self.claims.release(f"{done.index:08d}")
+                elif self.bar is not None:
+                    self.bar.update(n)
+        except KeyboardInterrupt:
+            wait = self.claims is None  # others take what is not done
+            raise
+        finally:
             arriving.close()  # type: ignore[attr-defined]
             for made in own:
-                made.shutdown(wait=True, cancel_futures=True)
-            if bar is not None:
-                bar.close()
-        self.kept(lambda: store.finish(self._about(), self.setting.times, self.samples.block))
-        return Ensemble(store.folder, n_before, clock.perf_counter() - begun, self._doubts())
+                made.shutdown(wait=wait, cancel_futures=True)
+
+    def _complete(self) -> bool:
+        return self.store.complete() and not self._missing()
+
+    def _missing(self) -> list[str]:
+        """Formats that are not written yet."""
+        return [name for name in self.how.formats if not (self.store.folder / EXPORTS[name].file).exists()]
+
+    def _finish(self) -> None:
+        """Put the chunks together, and write other formats."""
+        if not self.store.complete():
+            self.store.finish(self.plan.about(), self.plan.setting.times, self.plan.samples.block)
+        for name in self._missing():
+            EXPORTS[name].write(Ensemble(self.store.folder), self.store.folder / EXPORTS[name].file)
+
+    def _count(self, chunks: set[int]) -> int:
+        return sum(self.store.samples_in(k) for k in chunks)
 
     def kept(self, write: Callable[[], Any]) -> Any:
         """Do what writes to the disk; if the disk rejects it, report what is there."""
         try:
             return write()
         except OSError as error:
-            why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "results cannot be written"
-            raise self._stopped(f"{why} ({error})") from error
+            if self.claims is not None and self._complete():  # others, who took this worker for dead, have done it all
+                return None
+            raise self._stopped(_of_disk(error)) from error
 
     def _stopped(self, why: str) -> EnsembleStopped:
-        return EnsembleStopped(f"{self.setting.system.module.name}: the ensemble stopped: {why}; {self._what_is_kept()}",
-                               self.n_done, self.store.count)
+        return EnsembleStopped(f"{self.plan.name}: the ensemble stopped: {why}; {self._what_is_kept()}", self.n_done,
+                               self.store.count)
+
+    def _members(self, piece: str) -> str:
+        first = int(piece) * self.store.size
+        return f"samples {first} to {first + self.store.samples_in(int(piece)) - 1}"
 
     def _doubts(self) -> str:
         """What to warn of where derivatives of members are doubtful."""
@@ -258,17 +362,14 @@ class _Run:
     def _what_is_kept(self) -> str:
         if not self.lasting:
             return f"{self.n_done} of {self.store.count} samples were done; with a path they would be kept"
-        return (f"{self.n_done} of {self.store.count} samples are kept in {self.store.folder}; "
+        n_kept = self.n_done if self.claims is None else self._count(self.store.there())
+        return (f"{n_kept} of {self.store.count} samples are kept in {self.store.folder}; "
                 "pass resume=True (--resume) to go on from there")
-
-    def _chunk(self, k: int) -> Chunk:
-        first = k * self.store.size
-        return Chunk(self.setting, k, first, self.samples.block(first, first + self.store.samples_in(k)))
 
     def _executors(self) -> tuple[Callable[[], Executor], bool, list[Executor]]:
         """What gives executors, whether it gives another one, and those that are ours to end."""
         own: list[Executor] = []
-        given = self.executor
+        given = self.how.executor
         if given is not None and hasattr(given, "submit"):
             return (lambda: given), False, own
         if given is not None and not callable(given):
@@ -276,68 +377,11 @@ class _Run:
                                 f"found {shown(given)}")
 
         def make() -> Executor:
-            workers = (os.cpu_count() or 1) if self.setting.device == "cpu" else 1
+            workers = (os.cpu_count() or 1) if self.plan.setting.device == "cpu" else 1
             own.append(ThreadPoolExecutor(workers) if given is None else given())
             return own[-1]
 
         return make, True, own
-
-    def _about(self) -> dict[str, Any]:
-        module, measures = self.setting.system.module, self.setting.measures
-        return {"system": module.name, "names": list(self.samples.names), "varied": list(self.samples.varied),
-                "outcomes": [m.label for m in measures], "count": self.store.count,
-                "shapes": {m.label: s for m, s in zip(measures, self.setting.shapes)},
-                "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata.units},
-                "about": {m.label: m.record() for m in measures},
-                "sensitivities": list(self.setting.options.get("sensitivities", ())),
-                "rtol": self.setting.options.get("rtol", 1e-8)}
-
-
-def _tried(setting: Setting, samples: Samples) -> Setting:
-    """The setting with the shapes of outcomes. Raises ArgumentError where all that was tried is asked for wrongly."""
-    module: Module = setting.system.module
-    places = sorted({int(k) for k in np.linspace(0, samples.count - 1, TRIED)})
-    wrong: list[ArgumentError] = []
-    for k in places:
-        try:
-            solution = motion(setting, samples.block(k, k + 1)[0])
-            return replace(setting, shapes=tuple(m.of(solution).shape for m in setting.measures))
-        except ArgumentError as error:
-            wrong.append(error)
-        except (CompileError, CompilerNotFound):
-            raise
-        except Exception:  # it will stand among the failures
-            continue
-    if len(wrong) == len(places):
-        raise ArgumentError(f"none of {len(places)} samples that were tried can be simulated; the first: {wrong[0]}")
-    return replace(setting, shapes=tuple(_shape(m, setting, module) for m in setting.measures))
-
-
-def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...]:
-    """The shape of an outcome where no motion shows it; of a function a number."""
-    own = dict(module.metadata.outputs).get(measure.name, ())
-    by = (len(setting.options["sensitivities"]),) if measure.grad else ()
-    return (len(setting.times), *own, *by) if measure.kind == "trace" else (*own, *by)
-
-
-def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:
-    portable: PortableModule = setting.system
-    functions = {m.label: fingerprint(m.function) for m in setting.measures if m.function is not None}
-    return {**({"functions": functions} if functions else {}), "system": portable.module.name,
-            "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": samples.record(),
-            "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
-            "outcomes": {m.label: m.record() for m in setting.measures}, "consistent": setting.consistent,
-            "vectors": setting.vectors, **({} if setting.device == "cpu" else {"device": setting.device}),
-            "base": {k: v.tolist() for k, v in setting.base.items()},
-            "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}
-
-
-def _whole(value: Any, what: str, module: Module) -> int | None:
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ArgumentError(f"{module.name}: {what} must be a whole number from 1 on, found {shown(value)}")
-    return int(value)
 
 
 def _bar(name: str, count: int, before: int) -> Any:

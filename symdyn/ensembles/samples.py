@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import threading
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -25,6 +26,8 @@ SAMPLINGS = ("paired", "grid", "random", "latin_hypercube", "sobol")
 # Rounds of the network that permutes numbers; from four on it is as good as random.
 ROUNDS = 6
 SOBOL_LIMIT = 2**30
+# Threads that draw continue sequences one at a time.
+_SEQUENCES = threading.Lock()
 # Bytes that all samples may take on the disk, in the results of an ensemble.
 MOST = 2**40
 
@@ -98,6 +101,7 @@ class Samples:
             raise ArgumentError("\n".join(faults))
         assert count is not None
         self.count, self.seed = int(count), int(seed)
+        self._sequence: tuple[Any, int] | None = None
 
     def block(self, first: int, stop: int) -> np.ndarray:
         """Samples first to stop - 1, (stop - first, n_names)."""
@@ -129,13 +133,7 @@ class Samples:
     def _probabilities(self, k: np.ndarray) -> np.ndarray:
         n, first = len(self.varied), int(k[0]) if len(k) else 0
         if self.sampling == "sobol" and n:
-            from scipy.stats import qmc
-
-            engine = qmc.Sobol(n, seed=self.seed)
-            if first:
-                engine.fast_forward(first)
-                return np.asarray(engine.random(len(k)))
-            return np.vstack([engine.random(1), engine.random(len(k) - 1)])  # so it does not ask for a power of two
+            return self._sobol(n, first, len(k))
         # Philox counts in fours of numbers: any of them is reached at once.
         generator = np.random.Philox(self.seed)
         generator.advance(first * n // 4)
@@ -145,6 +143,22 @@ class Samples:
             return drawn
         places = np.column_stack([_permuted(k, self.count, (self.seed, d)) for d in range(n)]) if n else drawn
         return (places + drawn) / self.count
+
+    def _sobol(self, n: int, first: int, count: int) -> np.ndarray:
+        """Points of a scrambled Sobol sequence, (count, n). To skip points takes SciPy time for each, so that the sequence of the
+        last call is continued where that is possible."""
+        from scipy.stats import qmc
+
+        with _SEQUENCES:
+            engine, there = self._sequence or (None, 0)
+            if engine is None or there > first:
+                engine, there = qmc.Sobol(n, seed=self.seed), 0
+            if first > there:
+                engine.fast_forward(first - there)
+            # The first point by itself, so that no power of two is asked for.
+            parts = [engine.random(m) for m in ((1, count - 1) if first == 0 and count else (count,)) if m]
+            self._sequence = engine, first + count
+        return np.vstack([np.zeros((0, n)), *parts])
 
     def __repr__(self) -> str:
         return f"<Samples: {self.count} of {', '.join(self.names)} ({self.sampling})>"

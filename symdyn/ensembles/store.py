@@ -4,11 +4,14 @@
     chunks/K.npz      outcomes of a chunk, each file whole or not there
     ensemble.npz      all of it in order, at the end; then the chunks go
     failures.jsonl    a line for each member that failed
+    claims/, workers/ what workers do that share the folder, and what they have done, until the end
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -23,6 +26,7 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.building.stored import write_whole
 
 RESULT, FAILURES, MANIFEST = "ensemble.npz", "failures.jsonl", "manifest.json"
+CHUNKS, CLAIMS, WORKERS = "chunks", "claims", "workers"
 
 
 class Store:
@@ -34,23 +38,42 @@ class Store:
 
     def __init__(self, folder: Path, count: int, size: int, columns: Mapping[str, tuple[int, ...]]) -> None:
         self.folder, self.count, self.size, self.columns = folder, count, size, dict(columns)
-        self.chunks = folder / "chunks"
+        self.chunks = folder / CHUNKS
         self.n_chunks = -(-count // size)
 
-    def begin(self) -> set[int]:
-        """Make the folder; which chunks are there already."""
+    def begin(self, shared: bool = False) -> set[int]:
+        """Make the folder; which chunks are there already. Where it is shared, what others are writing stays, and chunks are
+        checked when they are put together."""
         self.chunks.mkdir(parents=True, exist_ok=True)
+        if shared:
+            return self.there()
         for left in self.chunks.glob(".*.tmp"):
             left.unlink(missing_ok=True)
-        there = (int(path.stem) for path in self.chunks.glob("*.npz") if path.stem.isdigit())
-        return {k for k in there if k < self.n_chunks and self._is_whole(k)}
+        return {k for k in self.there() if self._is_whole(k)}
+
+    def there(self) -> set[int]:
+        """Which chunks have files, by their names alone."""
+        found: set[int] = set()
+        with contextlib.suppress(FileNotFoundError):
+            found = {int(stem) for entry in os.scandir(self.chunks)
+                     if (stem := entry.name.removesuffix(".npz")).isdigit() and entry.name != stem}
+        return {k for k in found if k < self.n_chunks}
+
+    def drop_damaged(self) -> bool:
+        """Remove chunks that the disk has damaged; whether there were any."""
+        damaged = [k for k in self.there() if not self._is_whole(k)]
+        for k in damaged:
+            self._path(k).unlink(missing_ok=True)
+        return bool(damaged)
 
     def complete(self) -> bool:
-        """Whether the run came to its end; then what it may have left is removed."""
-        if not (self.folder / RESULT).is_file():
-            return False
-        shutil.rmtree(self.chunks, ignore_errors=True)
-        return True
+        """Whether the chunks were put together."""
+        return (self.folder / RESULT).is_file()
+
+    def clear(self) -> None:
+        """Remove what is of no use once the result is there."""
+        for name in (CHUNKS, CLAIMS, WORKERS):
+            shutil.rmtree(self.folder / name, ignore_errors=True)
 
     def put(self, done: Done) -> None:
         """Keep a chunk. Raises OSError as the disk does."""
@@ -62,7 +85,7 @@ class Store:
         return min(self.size, self.count - chunk * self.size)
 
     def finish(self, about: Mapping[str, Any], times: np.ndarray, block: Callable[[int, int], np.ndarray]) -> None:
-        """Put the chunks together, a chunk at a time, whatever their number, and remove them.
+        """Put the chunks together, a chunk at a time, whatever their number.
 
         block   samples first to stop - 1
         """
@@ -99,7 +122,6 @@ class Store:
             *(Entry(label, (self.count, *shape), np.dtype(float), column(label)) for label, shape in self.columns.items()),
             Entry("failed", (self.count,), np.dtype(bool), failed()), Entry.of("t", times),
             Entry.of("about", json.dumps(about, sort_keys=True))])
-        shutil.rmtree(self.chunks, ignore_errors=True)
 
     def _failures(self, chunk: int) -> list[tuple[int, str]]:
         with reading(self._path(chunk)) as archive:

@@ -17,7 +17,7 @@ import pytest
 from scipy import stats
 
 import symdyn as sd
-from symdyn.ensembles import chunk, portable, run, store
+from symdyn.ensembles import chunk, plan, portable, store
 from symdyn.ensembles.archive import thinned
 from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
@@ -558,7 +558,7 @@ def test_motions_on_vectors_have_the_outcomes_of_single_ones(module, monkeypatch
     outcomes = {"end": "end q1", "mean": "mean q2", "at": "q2_dot at 0.2", "all": "trace q1", "energy": "max energy",
                 "far": farthest, "some": sometimes_far}
     one = sd.ensemble(module, samples, np.linspace(0, 0.5, 6), outcomes, chunk=9)
-    monkeypatch.setattr(run, "VECTORS_FROM", 1)
+    monkeypatch.setattr(plan, "VECTORS_FROM", 1)
     monkeypatch.setattr(chunk, "NUMBERS", 150)  # six motions at a time
     several = sd.ensemble(module, samples, np.linspace(0, 0.5, 6), outcomes, chunk=9)
     assert several.failures() == one.failures() and {f["index"] for f in one.failures()} == {7, 19}
@@ -574,7 +574,7 @@ def sometimes_far(solution):
 
 
 def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeypatch):
-    monkeypatch.setattr(run, "VECTORS_FROM", 1)
+    monkeypatch.setattr(plan, "VECTORS_FROM", 1)
     done = sd.ensemble(module, {"m1": [1.0, 0.0, 1.0], "m2": [1.0, 0.0, 2.0], "I1": [0.1, 0.0, 0.1], "I2": [0.1, 0.0, 0.1]}, T)
     assert done.failed.tolist() == [False, True, False]
     assert "double_pendulum" in done.failures()[0]["message"]

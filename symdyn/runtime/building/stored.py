@@ -11,6 +11,7 @@ import hashlib
 import importlib.machinery
 import importlib.util
 import os
+import platform
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -25,9 +26,11 @@ def write_whole(path: Path, fill: Callable[[IO[bytes]], object], mode: int = 0o6
     """Write a file next to its final name and move it there in one step: whoever sees the name sees a whole file.
 
     fill   writes the content; mode: permissions, less the umask; sync: wait until the content is on the disk
-    Each process and thread writes to a scratch file of its own. Raises OSError as the disk does; then nothing is left of it.
+    Each process and thread, on whatever machine, writes to a scratch file of its own. Raises OSError as the disk does; then
+    nothing is left of it.
     """
-    scratch = path.with_name(f".{path.name[:100]}.{os.getpid()}-{threading.get_ident()}.tmp")
+    owner = f"{platform.node()[:60]}-{os.getpid()}-{threading.get_ident()}"
+    scratch = path.with_name(f".{path.name[:100]}.{owner}.tmp")
     try:
         # A scratch file of the same name was left by a process that was killed; it is not written into, as it may be a link.
         scratch.unlink(missing_ok=True)
