@@ -23,7 +23,7 @@ from symdyn.cli.schema import schema
 from symdyn.cli.simulate import simulate
 from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
-from symdyn.cli.values import path, stabilization
+from symdyn.cli.values import path, stabilization, whole
 from symdyn.cli.view import view
 
 
@@ -180,6 +180,14 @@ def _add_sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--dask-timeout", metavar="SECONDS", type=float, default=30.0, help="how long it is waited for")
     parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped, in the same folder")
+    parser.add_argument("--dry-run", action="store_true", help="predict time, memory and disk from ten samples, and what breaks "
+                        "first with more of them")
+    parser.add_argument("--count", metavar="N", type=whole, help="with --dry-run: samples in place of the file's, such as 1e9")
+    parser.add_argument("--workers", metavar="N", type=whole, help="of the cluster, in place of the file's")
+    parser.add_argument("--status", action="store_true", help="show what all workers have done so far, and which there are")
+    parser.add_argument("--join", action="store_true", help="share the work with all that run in the same folder, at any time "
+                        "and on any machine that reaches it; ends when nothing is left to begin")
+    parser.add_argument("--stay", action="store_true", help="with --join: wait for the others, and take over what they leave")
     parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")

@@ -17,6 +17,7 @@ from symdyn.cli.messages import FAILED, INTERRUPTED, WRONG, Stop, complain
 from symdyn.errors import ArgumentError, EnsembleStopped, MissingExtra, SymdynError
 
 if TYPE_CHECKING:
+    from symdyn.ensembles.cluster import Cluster
     from symdyn.ensembles.result import Ensemble
     from symdyn.ensembles.sweep_file import Sweep
     from symdyn.runtime.module import Module
@@ -28,23 +29,40 @@ SUMMARIZED = 100_000
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """Read the file, simulate, tell, draw."""
-    from symdyn.ensembles.run import ensemble
+    """Read the file, simulate here or on a cluster, tell, draw."""
+    from symdyn.cli import sweep_on_cluster
+    from symdyn.ensembles.claims import LEASE
+    from symdyn.ensembles.exports import demand_formats
+    from symdyn.ensembles.plan import plan
+    from symdyn.ensembles.run import How, StillAtWork, run
+    from symdyn.ensembles.store import RESULT
     from symdyn.ensembles.sweep_file import read_sweep
 
-    if arguments.jobs is not None and arguments.jobs < 1:
-        raise Stop(f"--jobs must be 1 or more, found {arguments.jobs}")
-    if arguments.jobs is not None and arguments.dask is not None:
-        raise Stop("--jobs is for this machine, --dask for a cluster; give one of them")
-    faults: list[str] = []
-    asked = read_sweep(arguments.file, faults)
-    module = _checked(arguments, asked, faults)
-    folder = arguments.output or asked.folder or Path("generated") / arguments.file.stem
     begun = clock.perf_counter()
-    with _executor(arguments, module, asked.values.get("device", "cpu")) as executor:
+    faults: list[str] = []
+    asked = read_sweep(arguments.file, faults, arguments.count)
+    _check_arguments(arguments, asked, faults)
+    folder = arguments.output or asked.folder or Path("generated") / arguments.file.stem
+    if arguments.status:
+        return sweep_on_cluster.show_status(folder, asked.cluster)
+    cluster = sweep_on_cluster.with_scheduler(arguments, asked.cluster, faults)
+    module = _checked(arguments, asked, faults)
+    wanted = plan(module, **asked.arguments(module))
+    formats = demand_formats(asked.values.get("formats", ()), module.name)
+    if arguments.dry_run:
+        return sweep_on_cluster.dry_run(arguments, wanted, cluster, folder, formats)
+    if cluster is not None and cluster.kind == "slurm" and not arguments.join and not (folder / RESULT).is_file():
+        return sweep_on_cluster.submit(arguments, wanted, cluster, folder, formats)
+    shared = arguments.join or (cluster is not None and cluster.kind == "folder")
+    with _executor(arguments, module, asked.values.get("device", "cpu"), cluster) as executor, \
+            sweep_on_cluster.ends_on_sign(shared):
+        lease = (cluster.lease if cluster is not None else LEASE) if shared else None
+        how = How(executor, None, arguments.progress, formats, lease, not arguments.join or arguments.stay)
         try:
-            done = ensemble(module, **asked.arguments(module), path=folder, resume=arguments.resume, executor=executor,
-                            progress=arguments.progress)
+            done = run(wanted, folder, how, arguments.resume)
+        except StillAtWork as others:
+            print(others)
+            return 0
         except EnsembleStopped as stop:
             return complain(str(stop), FAILED)
         except KeyboardInterrupt as stop:
@@ -57,6 +75,35 @@ def sweep(arguments: argparse.Namespace) -> int:
         except MissingExtra as missing:
             print(f"no picture: {missing}")
     return 0
+
+
+def _check_arguments(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> None:
+    """What contradicts itself on the command line is an error by itself; what contradicts the file is a fault of it."""
+    wrong = []
+    if arguments.jobs is not None and arguments.jobs < 1:
+        wrong.append(f"--jobs must be 1 or more, found {arguments.jobs}")
+    if arguments.jobs is not None and arguments.dask is not None:
+        wrong.append("--jobs is for this machine, --dask for a cluster; give one of them")
+    modes = [name for name, given in (("--dry-run", arguments.dry_run), ("--status", arguments.status),
+                                      ("--join", arguments.join)) if given]
+    if len(modes) > 1:
+        wrong.append(f"{' and '.join(modes)} ask for different things; give one of them")
+    if arguments.join and arguments.dask is not None:
+        wrong.append("--join computes here, --dask on a cluster; give one of them")
+    if arguments.stay and not arguments.join:
+        wrong.append("--stay goes with --join: a run that does not share its work does not end before it is done")
+    if arguments.count is not None and not arguments.dry_run:
+        wrong.append("--count goes with --dry-run; for the run itself write the count into the file")
+    if wrong:
+        raise Stop("\n".join(wrong))
+    kind = asked.cluster.kind if asked.cluster is not None else None
+    if arguments.workers is not None and kind is None:
+        faults.append(f"--workers {arguments.workers}: the file names no cluster; give it a line such as cluster = \"slurm\", or "
+                      "pass --jobs for this machine")
+    if kind == "slurm" and arguments.dask is not None:
+        faults.append(f"cluster: slurm is asked for, and --dask {arguments.dask} too; leave out one of them")
+    if kind in ("slurm", "dask") and arguments.jobs is not None and not arguments.join:
+        faults.append(f"cluster: {kind} is asked for, but --jobs is for this machine; write cores and workers into [cluster]")
 
 
 def _checked(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> Module:
@@ -121,25 +168,28 @@ def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
 
 
 @contextlib.contextmanager
-def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu") -> Iterator[Any]:
-    """What --jobs and --dask name: a cluster; threads where code is compiled, else processes, which do not wait
+def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu",
+              cluster: Cluster | None = None) -> Iterator[Any]:
+    """What --jobs, --dask and the file name: a cluster; threads where code is compiled, else processes, which do not wait
     for each other; one thread where a GPU computes."""
-    if arguments.dask is not None:
+    address = arguments.dask or (cluster.address if cluster is not None and not arguments.join else None)
+    if address is not None:
         try:
             from distributed import Client
         except ImportError:
             raise MissingExtra("--dask needs Dask: pip install 'symdyn[dask]'") from None
         try:
-            client = Client(arguments.dask, timeout=arguments.dask_timeout)
+            client = Client(address, timeout=arguments.dask_timeout)
         except (OSError, ValueError, TimeoutError) as error:
-            raise Stop(f"--dask {arguments.dask}: no scheduler there ({error})", FAILED) from None
+            raise Stop(f"--dask {address}: no scheduler there ({error})", FAILED) from None
         with client:
             yield client.get_executor()
         return
     from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
     from multiprocessing import get_context
 
-    jobs = arguments.jobs or (1 if device != "cpu" else os.cpu_count() or 1)
+    cores = cluster.cores if cluster is not None and cluster.kind == "folder" else None
+    jobs = arguments.jobs or cores or (1 if device != "cpu" else os.cpu_count() or 1)
     if module.backend == "c" or jobs == 1:
         yield lambda: ThreadPoolExecutor(jobs)
     else:

@@ -34,6 +34,17 @@ def numbers(items: Iterable[str], what: str) -> dict[str, float] | None:
     return found or None
 
 
+def whole(text: str) -> int:
+    """A whole number from 1 on, also as 1e9."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1 <= value < 1e18 or value != int(value):
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 on, such as 64 or 1e9, found {text!r}")
+    return int(value)
+
+
 def stabilization(text: str) -> str | tuple[str, float]:
     """projection, baumgarte or none; of baumgarte=GAIN the pair."""
     way, sign, gain = text.partition("=")

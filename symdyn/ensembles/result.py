@@ -113,9 +113,9 @@ class Ensemble:
         return path
 
     def to_zarr(self, path: PathName | None = None) -> Path:
-        """Write a Zarr folder of arrays, as `xarray.open_zarr(path, consolidated=False)` reads it: samples, every outcome, failed, over the axes member and
-        t. The rows are read and written in pieces. Returns the path, by default ensemble.zarr next to ensemble.npz; a folder that
-        is there is replaced. Raises MissingExtra without zarr.
+        """Write a Zarr folder of arrays, as `xarray.open_zarr(path, consolidated=False)` reads it: samples, every outcome,
+        failed, over the axes member and t. Rows are read and written in pieces. Returns the path, by default ensemble.zarr next
+        to ensemble.npz; a folder that is there is replaced. Raises MissingExtra without zarr.
 
         >>> import tempfile
         >>> module = sd.systems.pendulum().compile(backend="numpy")

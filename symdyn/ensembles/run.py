@@ -155,12 +155,12 @@ class StillAtWork(Exception):
 
 
 def prepare(asked: Plan, folder: Path, resume: bool) -> tuple[Plan, Store]:
-    """Try some samples, and write down what is asked for in the folder, unless that stands there.
+    """Try some samples, unless that was done, and write down what is asked for in the folder, unless that stands there.
 
     Raises ArgumentError where a folder holds something else; OSError as the disk does.
     """
     found = check_folder(folder, resume)
-    asked = asked.tried()
+    asked = asked if asked.setting.shapes else asked.tried()
     size = asked.size or (found or {}).get("chunk") or asked.chunk_size()
     manifest = asked.manifest(size)
     if found is None:
@@ -269,7 +269,9 @@ class _Run:
                                      "again: their memory or their time may not suffice; start again with fewer samples in a "
                                      "chunk, more memory or more time")
             if not self.how.stays:
-                raise StillAtWork(self._what_is_kept())
+                left = self.store.count - self._count(self.store.there())
+                others = f"{left} of {self.store.count} samples at work" if left else "begun to put the results together"
+                raise StillAtWork(f"{self.plan.name}: nothing is left to begin; other workers have {others}")
             clock.sleep(LOOK)
 
     def _claimed(self, claims: Claims) -> Iterator[Chunk]:

@@ -12,6 +12,8 @@ A sweep file is data, which may come from anyone: it runs no program, and its re
     seed = 1
     outcomes = ["end q1", "max q2", "mean energy", "q1 at 2.5", "trace q1"]
     output = "results/my_sweep"         # inside the folder of this file; --output of the command line names any folder
+    formats = ["parquet"]               # written next to ensemble.npz; or "zarr"
+    cluster = "slurm"                   # see symdyn.ensembles.cluster; default: this machine
 
     [parameters]
     m1 = 1.5                            # the same for all
@@ -37,6 +39,8 @@ import numpy as np
 
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.ensembles.axes import read_axis
+from symdyn.ensembles.cluster import Cluster, read_cluster
+from symdyn.ensembles.exports import EXPORTS
 from symdyn.ensembles.samples import SAMPLINGS, Samples
 from symdyn.errors import ArgumentError
 from symdyn.shown import shown
@@ -46,7 +50,8 @@ TABLES = {"parameters": ("parameters",), "initial": ("q", "u", "z"), "inputs": (
 KEYS = {"system": "text", "options": "table", "formulation": "text", "coordinates": "text", "t": "times", "rtol": "positive",
         "atol": "positive", "method": "text", "max_steps": "whole", "max_step": "positive", "stabilization": "text",
         "device": "text", "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
-        "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs", "output": "folder", **dict.fromkeys(TABLES, "table")}
+        "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs", "output": "folder", "formats": "texts",
+        "cluster": "cluster", "dask": "cluster", **dict.fromkeys(TABLES, "table")}
 OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities", "device")
 # No double is larger; whole numbers of TOML have any number of digits.
 LARGEST = sys.float_info.max
@@ -60,11 +65,13 @@ class Sweep:
 
     values   the texts, numbers and tables that stood there and are right
     folder   where results go: the file's `output`, inside the folder of the file; None without one
+    cluster  where motions are computed; None: on this machine
     """
 
     values: dict[str, Any]
     folder: Path | None = None
     samples: Samples | None = None
+    cluster: Cluster | None = None
     fixed: dict[str, dict[str, float]] = field(default_factory=dict)
     varied: dict[str, list[str]] = field(default_factory=dict)
 
@@ -90,8 +97,11 @@ class Sweep:
         return faults
 
 
-def read_sweep(path: Path, faults: list[str]) -> Sweep:
-    """Read a sweep file; what is wrong with it is added to the faults."""
+def read_sweep(path: Path, faults: list[str], count: int | None = None) -> Sweep:
+    """Read a sweep file; what is wrong with it is added to the faults.
+
+    count   of samples, in place of that of the file
+    """
     try:
         with path.open("rb") as file:
             content = tomllib.load(file)
@@ -104,8 +114,12 @@ def read_sweep(path: Path, faults: list[str]) -> Sweep:
     except OSError as error:
         faults.append(f"cannot be read: {error.strerror or error}")
         return Sweep({})
+    if count is not None:
+        content["count"] = count
     values: dict[str, Any] = {}
     for key, value in content.items():
+        if KEYS.get(key) == "cluster":
+            continue
         if key not in KEYS:
             near = difflib.get_close_matches(key, KEYS, 1)
             faults.append(f"{key}: not known" + (f", did you mean {near[0]}?" if near else f"; known are {', '.join(KEYS)}"))
@@ -115,6 +129,7 @@ def read_sweep(path: Path, faults: list[str]) -> Sweep:
         if len(faults) == before:
             values[key] = taken
     sweep = Sweep(values, _inside(path.parent, values["output"], faults) if "output" in values else None)
+    sweep.cluster = read_cluster(content, faults)
     _take_samples(sweep, content, faults)
     return sweep
 
@@ -137,6 +152,8 @@ def _value(key: str, value: Any, kind: str, faults: list[str]) -> Any:
         faults.append(f"{key}: must be {wanted}, found {shown(value, 80)}")
     elif key in CHOICES and value not in CHOICES[key]:
         faults.append(f"{key}: must be one of {', '.join(CHOICES[key])}, found {shown(value, 80)}")
+    elif key == "formats" and not set(value) <= set(EXPORTS):
+        faults.append(f"formats: must be of {', '.join(EXPORTS)}, found {shown(value, 80)}; ensemble.npz is written always")
     elif key == "options":
         faults += [f"options.{k}: must be a number, a text or true or false, found {shown(v, 80)}" for k, v in value.items()
                    if not isinstance(v, (bool, int, float, str))]

@@ -16,6 +16,8 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli import main
+from symdyn.ensembles import run
+from symdyn.ensembles.progress import read_status
 from symdyn.runtime.building.recall import recall
 
 COUNT = 400
@@ -64,6 +66,40 @@ def test_sweep_on_a_cluster(cluster, tmp_path, capsys):
     assert "2 samples of q1, 2 in" in capsys.readouterr().out
     assert main([*asked, "tcp://127.0.0.1:9", "--dask-timeout", "0.2"]) == 1
     assert "--dask tcp://127.0.0.1:9: no scheduler there" in capsys.readouterr().err
+
+
+def test_a_line_of_the_file_names_the_cluster(cluster, tmp_path, capsys, monkeypatch):
+    text = '{line}\nsystem = "double_pendulum"\nt = [0, 0.1]\n[initial]\nq1 = [0.1, 0.2]\n'
+    for name, line, address in (("a", f'dask = "{cluster.scheduler_address}"', ""),
+                                ("b", 'cluster = "dask"', cluster.scheduler_address)):
+        monkeypatch.setitem(dask_config(), "scheduler-address", address)
+        (tmp_path / f"{name}.toml").write_text(text.format(line=line))
+        assert main(["sweep", str(tmp_path / f"{name}.toml"), "--no-picture", "--output", str(tmp_path / name)]) == 0
+        assert "2 samples of q1, 2 in" in capsys.readouterr().out
+    assert (tmp_path / "a" / "ensemble.npz").read_bytes() == (tmp_path / "b" / "ensemble.npz").read_bytes()
+    (tmp_path / "c.toml").write_text(text.format(line='dask = "tcp://127.0.0.1:9"'))
+    assert main(["sweep", str(tmp_path / "c.toml"), "--output", str(tmp_path / "c"), "--dask-timeout", "0.2"]) == 1
+    assert "--dask tcp://127.0.0.1:9: no scheduler there" in capsys.readouterr().err
+
+
+def dask_config():
+    """Dask's configuration, by which it finds a scheduler where none is named."""
+    import dask
+
+    return dask.config.config
+
+
+def test_all_workers_of_dask_are_shown_by_the_one_who_asked(cluster, tmp_path, monkeypatch):
+    seen = []
+    put = run.Store.put
+    monkeypatch.setattr(run.Progress, "add", lambda self, done, n, add=run.Progress.add: (add(self, done, n), self.write()))
+    monkeypatch.setattr(run.Store, "put", lambda self, done: (put(self, done), seen.append(read_status(tmp_path))))
+    with cluster.get_client() as client:
+        sd.ensemble(recall("double_pendulum", {}), samples(), (0, 0.1), chunk=10, path=tmp_path, executor=client.get_executor())
+    last = seen[-1]
+    assert (last.n_done, last.count, last.complete) == (COUNT, COUNT, False)
+    assert len(last.workers) == 2 and sum(w.samples for w in last.workers) == COUNT - 10  # the last one is not counted yet
+    assert not any(w.lost for w in last.workers) and all(w.samples > 0 for w in last.workers)
 
 
 SCRIPT = """

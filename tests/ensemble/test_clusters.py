@@ -1,0 +1,451 @@
+"""Sweeps on clusters: lines of the file and what contradicts itself in them, jobs under Slurm, what is predicted and shown."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import stat
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symdyn.cli import main, sweep_on_cluster
+from symdyn.ensembles import prediction, run, slurm
+from symdyn.ensembles.claims import Claims
+from symdyn.ensembles.cluster import Cluster, in_time, read_cluster
+from symdyn.ensembles.plan import plan
+from symdyn.ensembles.samples import Samples
+from symdyn.ensembles.sweep_file import read_sweep
+from symdyn.runtime.building.recall import recall
+
+SWEEP = """
+system = "double_pendulum"
+t = [0, 1]
+sampling = "latin_hypercube"
+count = {count}
+chunk = {chunk}
+outcomes = ["end q1", "max q2"]
+{more}
+[parameters]
+l1 = {{from = 0.5, to = 1.5}}
+[initial]
+q1 = {{from = -1, to = 1}}
+{table}
+"""
+
+
+def write(folder, more="", table="", count=400, chunk=20):
+    path = folder / "sweep.toml"
+    path.write_text(SWEEP.format(more=more, table=table, count=count, chunk=chunk))
+    return str(path)
+
+
+def read(**content):
+    faults = []
+    return read_cluster(content, faults), faults
+
+
+# -- the lines of the file
+
+
+@pytest.mark.parametrize("content, expected", [
+    ({}, None),
+    ({"cluster": "slurm"}, Cluster("slurm", 16, 1)),
+    ({"cluster": "folder"}, Cluster("folder")),
+    ({"cluster": "dask"}, Cluster("dask")),
+    ({"dask": "tcp://a:1"}, Cluster("dask", address="tcp://a:1")),
+    ({"dask": "tcp://a:1", "cluster": {"kind": "dask", "workers": 3}}, Cluster("dask", 3, address="tcp://a:1")),
+    ({"cluster": {"kind": "slurm", "workers": 4, "cores": 2, "memory": "1.5 GB", "time": "1-02:03:04", "partition": "a-b",
+                  "account": "x_1", "qos": "q", "lease": 30, "price": 0.5}},
+     Cluster("slurm", 4, 2, 1_500_000_000, 93784.0, "a-b", "x_1", "q", False, 30.0, 0.5)),
+    ({"cluster": {"kind": "slurm", "nodes": 3}}, Cluster("slurm", 3, None, nodes=True)),
+])
+def test_lines_about_a_cluster(content, expected):
+    assert read(**content) == (expected, [])
+
+
+@pytest.mark.parametrize("content, messages", [
+    ({"cluster": "slrum"}, ["cluster: there is no 'slrum', did you mean slurm?"]),
+    ({"cluster": "pbs"}, ["cluster: there is no 'pbs'; there are slurm, dask, folder"]),
+    ({"cluster": 3}, ["cluster: must be one of slurm, dask, folder, or a table with such a kind, found 3"]),
+    ({"cluster": {"workers": 3}}, ["cluster.kind: is missing; there are slurm, dask, folder"]),
+    ({"dask": 3}, ["dask: must be the address of a scheduler such as \"tcp://host:8786\", found 3"]),
+    ({"cluster": "slurm", "dask": "tcp://a:1"}, ["cluster and dask: slurm and Dask are both asked for; keep one of the lines"]),
+    ({"cluster": {"kind": "dask", "address": "tcp://b:1"}, "dask": "tcp://a:1"},
+     ["cluster.address and dask: two schedulers are asked for, 'tcp://b:1' and 'tcp://a:1'; keep one of them"]),
+    ({"cluster": {"kind": "dask", "time": "01:00:00", "partition": "a", "memory": "1 GB", "lease": 3}},
+     ["cluster.time: does not go with dask: only Slurm ends workers at a time; leave it out",
+      "cluster.partition: does not go with dask: it is of Slurm; leave it out",
+      "cluster.memory: does not go with dask: Dask's workers have theirs already; leave it out",
+      "cluster.lease: does not go with dask: Dask itself notices workers that are lost; leave it out"]),
+    ({"cluster": {"kind": "slurm", "address": "tcp://a:1"}},
+     ["cluster.address: does not go with slurm: it is of Dask; leave it out"]),
+    # All that is wrong at once.
+    ({"dask": "tcp://a:1", "cluster": {
+        "kind": "slurm", "workers": 0, "cores": True, "memory": "4", "time": 3600, "partition": "a; rm -rf /", "nodes": -1,
+        "acount": "a", "lease": 0, "price": "x", "account": "a\nb", "qos": "-x"}},
+     ["cluster and dask: slurm and Dask are both asked for; keep one of the lines",
+      "cluster.workers: must be a whole number from 1 on, found 0", "cluster.cores: must be a whole number from 1 on, found True",
+      "cluster.memory: must be a size such as \"4 GB\", found '4'",
+      "cluster.time: must be a time such as \"04:00:00\" (hours, minutes, seconds) or \"2-12:00:00\" (with days), found 3600",
+      "cluster.partition: must be a name of letters, digits and _ . , @ + -, found 'a; rm -rf /'",
+      "cluster.nodes: must be a whole number from 1 on, found -1", "cluster.acount: not known, did you mean account?",
+      "cluster.lease: must be a number of seconds from 1 on, found 0", "cluster.price: must be a positive number, found 'x'",
+      "cluster.account: must be a name of letters, digits and _ . , @ + -, found 'a\\nb'",
+      "cluster.qos: must be a name of letters, digits and _ . , @ + -, found '-x'",
+      "cluster.nodes and cluster.workers: nodes asks for whole nodes, with one worker on each that uses all of its cores; "
+      "leave workers out, or leave nodes out",
+      "cluster.nodes and cluster.cores: nodes asks for whole nodes, with one worker on each that uses all of its cores; "
+      "leave cores out, or leave nodes out"]),
+])
+def test_lines_that_contradict_themselves(content, messages):
+    assert read(**content) == (None, messages)
+
+
+def test_faults_of_the_cluster_are_among_the_others(tmp_path, capsys):
+    path = write(tmp_path, "tt = 1\ndask = \"tcp://a:1\"\nformats = [\"hdf5\"]",
+                 "[cluster]\nkind = \"slurm\"\nworkers = 0\ntime = 04:00:00\n")
+    assert main(["sweep", path]) == 2
+    told = capsys.readouterr().err
+    for fault in ("has 4 faults", "tt: not known", "formats: must be of parquet, zarr, found ['hdf5']; ensemble.npz is written",
+                  "cluster and dask: slurm and Dask are both", "cluster.workers: must be a whole number from 1 on, found 0"):
+        assert fault in told, told
+
+
+@pytest.mark.parametrize("more, arguments, message", [
+    ("", ["--workers", "3"],
+     "--workers 3: the file names no cluster; give it a line such as cluster = \"slurm\", or pass --jobs"),
+    ("cluster = \"slurm\"", ["--dask", "tcp://a:1"], "cluster: slurm is asked for, and --dask tcp://a:1 too; leave out one"),
+    ("cluster = \"slurm\"", ["--jobs", "3"],
+     "cluster: slurm is asked for, but --jobs is for this machine; write cores and workers"),
+    ("cluster = \"dask\"", [], "cluster: dask is asked for, but no scheduler; write dask = \"tcp://host:8786\""),
+    ("dask = \"tcp://far.example:1\"", [], "dask: 'tcp://far.example:1' is on another machine, and a scheduler can run programs "
+     "here, which a sweep file must not: confirm it, by --dask tcp://far.example:1 or in DASK_SCHEDULER_ADDRESS"),
+    ("", ["--dry-run", "--status"], "--dry-run and --status ask for different things; give one of them"),
+    ("", ["--join", "--dask", "tcp://a:1"], "--join computes here, --dask on a cluster; give one of them"),
+    ("", ["--stay"], "--stay goes with --join"),
+    ("", ["--count", "5"], "--count goes with --dry-run; for the run itself write the count into the file"),
+    ("", ["--status"], "holds no ensemble: nothing has begun there yet"),
+])
+def test_a_command_that_contradicts_the_file_or_itself(tmp_path, capsys, monkeypatch, more, arguments, message):
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    assert main(["sweep", write(tmp_path, more), "--output", str(tmp_path / "out"), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert message in told and not (tmp_path / "out").exists(), told
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "x", "1.5", "1e30", "nan"])
+def test_numbers_of_workers_and_samples(tmp_path, capsys, text):
+    with pytest.raises(SystemExit):
+        main(["sweep", write(tmp_path), "--dry-run", "--count", text])
+    assert "must be a whole number from 1 on, such as 64 or 1e9, found" in capsys.readouterr().err
+
+
+# -- Slurm
+
+
+def test_the_script_has_what_the_file_asks_for():
+    text = slurm.script(Cluster("slurm", 8, 4, 2**31, 5400.0, "batch", "me", "fast"), "swing", Path("/a b"), ["symdyn", "x y"])
+    lines = text.splitlines()
+    assert lines[0] == "#!/bin/sh" and lines[-1] == "exec symdyn 'x y' --jobs 4 \"$@\""
+    for line in ("job-name=symdyn-swing", "array=0-7", "nodes=1", "ntasks=1", "cpus-per-task=4", "mem=2048M", "time=0-01:30:00",
+                 "partition=batch", "account=me", "qos=fast", "output='/a b/logs/%A_%a.txt'", "requeue"):
+        assert f"#SBATCH --{line}" in lines
+    whole = slurm.script(Cluster("slurm", 3, nodes=True), "swing", Path("/a"), ["symdyn"], device=True).splitlines()
+    assert "#SBATCH --exclusive" in whole and "#SBATCH --gres=gpu:1" in whole and "#SBATCH --array=0-2" in whole
+    assert whole[-1] == 'exec symdyn --jobs "${SLURM_CPUS_ON_NODE:-1}" "$@"'
+    assert not [line for line in whole if "cpus-per-task" in line or "time=" in line]
+
+
+SBATCH = """#!{python}
+import os, re, subprocess, sys, time
+from pathlib import Path
+
+spool = Path({spool!r})
+known = {{"job-name", "array", "nodes", "ntasks", "cpus-per-task", "mem", "time", "partition", "account", "qos", "output",
+         "open-mode", "signal", "requeue", "exclusive", "gres", "dependency", "parsable"}}
+given = [a for a in sys.argv[1:] if a.startswith("--") and a != "--stay"]
+script, *more = [a for a in sys.argv[1:] if a not in given]
+lines = [line.split(" ", 1)[1] for line in Path(script).read_text().splitlines() if line.startswith("#SBATCH")]
+options = dict((a[2:].split("=", 1) + [""])[:2] for a in lines + given)
+assert set(options) <= known, options
+if options.get("partition") == "full":
+    sys.exit("sbatch: error: invalid partition specified: full")
+job = str(len(list(spool.glob("*.begun"))) + 1)
+(spool / (job + ".begun")).touch()
+print(job + ";cluster")
+sys.stdout.flush()
+if os.fork():
+    os._exit(0)
+os.setsid()
+for handle in (0, 1, 2):
+    os.dup2(os.open(os.devnull, os.O_RDWR), handle)
+if "dependency" in options:
+    first = options["dependency"].removeprefix("afterany:")
+    while not (spool / (first + ".done")).exists():
+        time.sleep(0.02)
+ends = options["array"].split("-")
+tasks = []
+for k in range(int(ends[0]), int(ends[-1]) + 1):
+    with open(options["output"].replace("%A", job).replace("%a", str(k)), "a") as log:
+        tasks.append(subprocess.Popen(["sh", script, *more], stdout=log, stderr=log, env={{
+            **os.environ, "SLURM_ARRAY_JOB_ID": job, "SLURM_ARRAY_TASK_ID": str(k)}}))
+    (spool / f"{{job}}_{{k}}.pid").write_text(str(tasks[-1].pid))
+for task in tasks:
+    task.wait()
+(spool / (job + ".done")).touch()
+"""
+
+SQUEUE = """#!{python}
+import sys
+from pathlib import Path
+
+spool = Path({spool!r})
+for job in next(a for a in sys.argv if a.startswith("--jobs=")).removeprefix("--jobs=").split(","):
+    if not (spool / (job + ".done")).exists():
+        print("RUNNING" if list(spool.glob(job + "_*.pid")) else "PENDING")
+"""
+
+
+@pytest.fixture
+def queue(tmp_path, monkeypatch):
+    """A folder with stand-ins for sbatch and squeue, which run tasks as processes of this machine."""
+    if os.name != "posix":
+        pytest.skip("Slurm is of POSIX")
+    spool, commands = tmp_path / "spool", tmp_path / "commands"
+    spool.mkdir()
+    commands.mkdir()
+    for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE)):
+        (commands / name).write_text(text.format(python=sys.executable, spool=str(spool)))
+        (commands / name).chmod(stat.S_IRWXU)
+    monkeypatch.setenv("PATH", f"{commands}{os.pathsep}{os.environ['PATH']}")
+    return spool
+
+
+def waited(path, seconds=60):
+    end = time.monotonic() + seconds
+    while not path.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert path.exists(), [p.name for p in path.parent.iterdir()]
+
+
+@pytest.mark.slow
+def test_a_sweep_under_slurm_is_the_same_with_a_worker_that_is_killed(tmp_path, capsys, queue):
+    asked = {"count": 1200, "chunk": 20, "table": "[cluster]\nkind = \"slurm\"\nworkers = 2\nlease = 1\ntime = 00:10:00\n"}
+    path, out = write(tmp_path, **asked), tmp_path / "out"
+    assert main(["sweep", path, "--output", str(out), "--no-picture"]) == 0
+    told = capsys.readouterr().out
+    assert "Slurm's job 1 with 2 workers computes 1200 samples in 60 chunks" in told and "scancel 1 stops it" in told
+    waited(queue / "1_1.pid")
+    while len(list((out / "chunks").glob("0*.npz"))) < 5 and not (queue / "1.done").exists():
+        time.sleep(0.002)
+    os.kill(int((queue / "1_1.pid").read_text()), signal.SIGKILL)
+    assert main(["sweep", path, "--output", str(out), "--status"]) == 0
+    shown = capsys.readouterr().out
+    assert "of 1200 samples are done (" in shown and "workers at work" in shown and "(job 1_0)" in shown
+    assert "Slurm's jobs 1 and 2: 1 pending, 1 running" in shown, shown
+    waited(queue / "2.done")
+    assert main(["sweep", path, "--output", str(out), "--status"]) == 0
+    assert "all 1200 samples are done; the results are in" in capsys.readouterr().out
+    assert main(["sweep", path, "--output", str(out), "--resume", "--no-picture"]) == 0
+    assert "1200 of them computed before" in capsys.readouterr().out
+    alone = write(tmp_path, count=1200, chunk=20)
+    assert main(["sweep", alone, "--output", str(tmp_path / "alone"), "--no-picture"]) == 0
+    assert (out / "ensemble.npz").read_bytes() == (tmp_path / "alone" / "ensemble.npz").read_bytes()
+    assert not [name for name in ("chunks", "claims", "workers") if (out / name).exists()]
+    assert len(list((out / "logs").iterdir())) == 3
+
+
+def test_what_slurm_rejects_is_reported_in_its_own_words(tmp_path, capsys, queue, monkeypatch):
+    path = write(tmp_path, table="[cluster]\nkind = \"slurm\"\npartition = \"full\"\n")
+    assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "sbatch rejects the job: sbatch: error: invalid partition specified: full; correct [cluster] in the sweep file" in told
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["sweep", path, "--output", str(tmp_path / "out"), "--resume", "--backend", "numpy"]) == 2
+    assert "holds another ensemble" in capsys.readouterr().err
+    assert main(["sweep", path, "--output", str(tmp_path / "new"), "--backend", "numpy"]) == 2
+    assert "there is no command sbatch here; run this where jobs are submitted" in capsys.readouterr().err
+
+
+def test_workers_are_not_submitted_twice(tmp_path, capsys, queue):
+    path, out = write(tmp_path, "cluster = \"slurm\""), tmp_path / "out"
+    begun(path, out)
+    assert main(["sweep", path, "--output", str(out)]) == 2
+    assert "holds an ensemble already; pass resume=True (--resume)" in capsys.readouterr().err
+    with Claims(out, "other") as other:
+        other.take(["00000004"])
+        assert main(["sweep", path, "--output", str(out), "--resume"]) == 2
+    told = capsys.readouterr().err
+    assert "1 chunk of" in told and "is being computed by workers; --status shows them, and sbatch" in told
+    assert not list(queue.iterdir())
+
+
+@pytest.mark.parametrize("table, messages", [
+    ("time = 00:00:01\nmemory = \"1 MB\"", ["has 2 faults", "cluster.time: 1 s are asked for, but a worker is predicted to take",
+     "for one chunk of 20 motions: it would end before anything is kept; ask for more time, or a smaller chunk",
+     "cluster.memory: 1 MB (1000000 bytes) are asked for, but a worker is predicted to take"]),
+    ("memory = \"2 MB\"", ["sweep.toml: cluster.memory: 2 MB"])])
+def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, table, messages):
+    path = write(tmp_path, table=f"[cluster]\nkind = \"slurm\"\n{table}\n")
+    for command in (["--dry-run"], []):
+        assert main(["sweep", path, "--output", str(tmp_path / "out"), *command]) == 2
+        told = capsys.readouterr().err
+        assert all(message in told for message in messages if "sweep.toml" not in message and "has 2" not in message), told
+    assert all(message in told for message in messages), told
+    assert not list(queue.iterdir()) and not (tmp_path / "out").exists()
+
+
+# -- what is predicted
+
+
+@pytest.fixture(scope="module")
+def planned():
+    samples = Samples({"q1": {"from": -1, "to": 1}, "l1": {"from": 0.5, "to": 1.5}}, "random", 600, 1)
+    return plan(recall("double_pendulum", {}), samples, np.linspace(0, 1, 11), ["end q1", "trace q2"], chunk=50).tried()
+
+
+@pytest.fixture(scope="module")
+def measured(planned, tmp_path_factory):
+    return prediction.measure(planned, tmp_path_factory.mktemp("dry"), 1, ())
+
+
+def test_bytes_and_files_are_those_of_a_run(planned, measured, tmp_path, monkeypatch):
+    found = prediction.predict(planned, measured, 600, 1, 1)
+    at_the_end = []
+    monkeypatch.setattr(run.Store, "clear", lambda self: at_the_end.append(
+        [p.stat().st_size for p in self.folder.rglob("*.npz")]))
+    run.run(planned, tmp_path / "a", run.How(), False)
+    assert found.files == len(at_the_end[0]) - 1 == 12
+    result = (tmp_path / "a" / "ensemble.npz").stat().st_size
+    assert found.result == pytest.approx(result, rel=0.05) and found.result == 600 * (8 * (2 + 12) + 1)
+    assert found.written == pytest.approx(sum(at_the_end[0]), rel=0.15)
+
+
+def test_a_prediction_is_arithmetic_for_any_number_of_motions(planned, measured):
+    free = replace(planned, size=None)
+    some, many = (prediction.predict(free, measured, n, 64, 4) for n in (10**8, 10**9))
+    assert many.core == pytest.approx(10 * some.core) and many.result == 10 * some.result
+    assert many.core == pytest.approx(1e9 * measured.motion) and many.workers * many.cores == 256
+    assert many.wall >= many.core / 256 and many.files == 10_000 and many.size * free.row < 2**26
+    large = replace(free, setting=replace(free.setting, shapes=((), (1001,))))
+    traces = prediction.predict(large, measured, 10**9, 64, 4)
+    assert traces.size == 2**26 // large.row and traces.files == -(-10**9 // traces.size)
+    twice = prediction.predict(free, measured, 10**9, 128, 4)
+    assert twice.wall - twice.merge == pytest.approx((many.wall - many.merge) / 2, rel=0.1)
+    slow = replace(measured, serial=0.5)
+    assert slow.speedup(1) == 1 and slow.speedup(4) == pytest.approx(1.6) and measured.speedup(3) > 0
+
+
+def test_chunks_for_a_cluster_are_lost_without_harm(planned, measured):
+    free, slow = replace(planned, size=None), replace(measured, motion=20.0)
+    assert prediction.fitted(planned, slow, 4, 1).size == 50  # as it was asked for
+    assert prediction.fitted(free, slow, 4, 1).size == 30  # ten minutes
+    assert prediction.fitted(free, slow, 4, 1, 2000.0).size == 10  # a tenth of the time limit
+    assert prediction.fitted(free, slow, 64, 4).size == 1  # each core has some
+    assert prediction.fitted(free, replace(measured, motion=1e9), 1, 1).size == 1
+
+
+def test_limits_are_sorted_and_lie_where_the_prediction_passes_them(planned, measured, tmp_path):
+    cluster = Cluster("slurm", 4, 1, memory=10**9, time=3600.0)
+    found = prediction.limits(replace(planned, size=None), measured, cluster, tmp_path / "no" / "folder", 4, 1)
+    numbers = [limit.motions for limit in found]
+    assert numbers == sorted(numbers) and len({limit.what for limit in found}) == len(found) >= 5
+    by_time = next(limit for limit in found if "time limit of 1 h" in limit.what)
+    below, above = (prediction.predict(replace(planned, size=None), measured, int(n), 4, 1).wall
+                    for n in (0.99 * by_time.motions, by_time.motions))
+    assert below <= 3600.0 < above
+    assert any("a reader that takes a whole outcome" in limit.what for limit in found)
+    few = prediction.limits(planned, measured, cluster, tmp_path, 4, 1)
+    files = next(limit for limit in few if "files in a folder" in limit.what)
+    assert files.motions == pytest.approx(50 * 100_000, rel=0.01) and "leave chunk out" in files.remedy
+
+
+def test_what_needs_more_time_to_be_put_together_than_there_is(planned, measured):
+    found = prediction.predict(replace(planned, size=None), replace(measured, merge=(0.0, 1.0)), 600, 4, 1)
+    faults = prediction.contradictions(found, measured, Cluster("slurm", 4, 1, time=100.0), False)
+    assert faults == [f"cluster.time: 100 s are asked for, but to put the results together is predicted to take "
+                      f"{in_time(found.merge)}; ask for more time"]
+    one = replace(found, size=1, chunk=500.0)
+    assert "for one chunk of 1 motion: it would end before anything is kept; ask for more time, or a shorter motion" in (
+        prediction.contradictions(one, measured, Cluster("slurm", 4, 1, time=100.0), True)[0])
+
+
+def test_a_dry_run_for_a_thousand_million_motions_makes_none_of_them(tmp_path, capsys):
+    path = write(tmp_path, "cluster = \"slurm\"\nformats = [\"parquet\"]")
+    Path(path).write_text(Path(path).read_text().replace("chunk = 20\n", ""))
+    pytest.importorskip("pyarrow")
+    before, out = prediction.resident(), str(tmp_path / "out")
+    assert main(["sweep", path, "--dry-run", "--count", "1e9", "--workers", "64", "--output", out]) == 0
+    told = capsys.readouterr().out
+    for part in ("1,000,000,000 motions for 64 workers of 1 core, predicted from 10 of them", "core hours",
+                 "10000 chunks of 100,000", "breaks first", "at the most", "a worker"):
+        assert part in told, told
+    assert prediction.resident() - before < 400e6  # 1e9 samples of two numbers are 16 GB
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep.toml"]
+
+
+def test_a_grid_has_the_count_of_its_file(tmp_path, capsys):
+    path = tmp_path / "a.toml"
+    path.write_text('system = "double_pendulum"\nsampling = "grid"\nt = [0, 0.1]\n[cluster]\nkind = "folder"\nworkers = 3\n'
+                    'cores = 2\nprice = 0.1\n[initial]\nq1 = [1, 2, 3]\n')
+    assert main(["sweep", str(path), "--dry-run", "--count", "7"]) == 2
+    assert "the grid has 3 samples, but the count is 7" in capsys.readouterr().err
+    assert main(["sweep", str(path), "--dry-run", "--output", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert "3 motions for 3 workers of 2 cores, predicted from 3 of them" in told and ", cost " in told
+
+
+# -- a folder
+
+
+def test_runs_that_share_a_folder(tmp_path, capsys):
+    path, out = write(tmp_path, "cluster = \"folder\"\nformats = [\"parquet\"]"), str(tmp_path / "out")
+    pytest.importorskip("pyarrow")
+    assert main(["sweep", path, "--output", out, "--no-picture"]) == 0
+    assert "400 samples of l1, q1" in capsys.readouterr().out and (tmp_path / "out" / "ensemble.parquet").is_file()
+    assert main(["sweep", path, "--output", out, "--no-picture", "--join"]) == 0
+    assert "400 of them computed before" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["chunk"] == 20
+
+
+def test_a_worker_that_joins_leaves_the_rest_to_the_others(tmp_path, capsys):
+    path, out = write(tmp_path), tmp_path / "out"
+    begun(path, out)
+    with Claims(out, "other") as other:
+        other.take(["00000004"])
+        assert main(["sweep", path, "--output", str(out), "--no-picture", "--join"]) == 0
+        assert "nothing is left to begin; other workers have 20 of 400 samples at work" in capsys.readouterr().out
+    with Claims(out, "other") as other:
+        other.take(["00000004"])
+        os.utime(other._own["00000004"], (0, 0))
+        assert main(["sweep", path, "--output", str(out), "--no-picture", "--join", "--stay"]) == 0
+        assert "380 of them computed before, 20 in" in capsys.readouterr().out
+
+
+def begun(path, out):
+    """The folder of the sweep of a file, without any chunk."""
+    faults = []
+    asked = read_sweep(Path(path), faults)
+    assert not faults
+    run.prepare(plan(recall("double_pendulum", {}), **asked.arguments(recall("double_pendulum", {}))), out, False)
+
+
+def test_many_workers_are_listed_up_to_a_number(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sweep_on_cluster, "LISTED", 2)
+    path, out = write(tmp_path), tmp_path / "out"
+    (out / "workers").mkdir(parents=True)
+    (out / "manifest.json").write_text(json.dumps({"system": "swing", "chunk": 10, "samples": {"count": 40}}))
+    for k in range(5):
+        (out / "workers" / f"w{k}.json").write_text(json.dumps(
+            {"state": "at work" if k else "has left", "begun": 0.0, "now": 10.0, "count": {f"w{k}": k}, "failed": 0, "task": ""}))
+    assert main(["sweep", path, "--output", str(out), "--status"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0] == "swing: 0 of 40 samples are done (0 %)"
+    assert told[1] == "4 workers at work: 1 samples a second, about 40 s are left"
+    assert len(told) == 5 and told[2].startswith("  w4: 4 samples, at work, heard of") and told[4] == "  and 3 more"
