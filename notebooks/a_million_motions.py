@@ -117,25 +117,43 @@ print(f"{cores} cores in place of the {os.cpu_count()} here take {count * per_mo
       f"and {count * len(outcomes) * 8 / 1e6:.0f} MB for the results")
 
 # %% [markdown]
-# On a cluster the same is a file and a line in the job script: `symdyn sweep map.toml --resume`, with `--dask tcp://host:8786`
-# for the workers of a cluster. Here it is with 256 samples in place of 1,048,576.
+# ## 5. On a cluster
+#
+# The same as a file, for `symdyn sweep`. The line `cluster = "slurm"` submits it to Slurm, `dask = "tcp://host:8786"` gives it
+# to Dask. With `cluster = "folder"`, as here, every process that runs the command computes chunks that no other has: two of
+# them, of which one is killed, do what one would. There are 32,768 samples in place of 1,048,576. First a dry run of the
+# million for 64 workers, from ten samples:
 
 # %%
 sweep = folder / "map.toml"
 sweep.write_text("""system = "double_pendulum"
 t = {from = 0, to = 10, count = 101}
 sampling = "sobol"
-count = 256
+count = 32768
 outcomes = ["max q2", "min q2"]
+[cluster]
+kind = "folder"
+lease = 2                # s, of a worker without a sign of life
 [initial]
 q1 = {from = -4.7, to = 1.6}
 q2 = {from = -3.1, to = 3.1}
 """, encoding="utf-8")
 command = [sys.executable, "-m", "symdyn", "sweep", str(sweep), "--output", str(folder / "sweep"), "--no-picture"]
-print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-assert any((folder / "sweep").rglob("ensemble.npz"))
+asked = [*command, "--dry-run", "--count", "1048576", "--workers", "64"]
+print(subprocess.run(asked, check=True, capture_output=True, text=True).stdout)
+
+# %%
+workers = [subprocess.Popen([*command, "--jobs", "1"], stdout=subprocess.DEVNULL) for _ in range(2)]
+while all(worker.poll() is None for worker in workers) and len(list((folder / "sweep" / "chunks").glob("0*.npz"))) < 4:
+    time.sleep(0.01)
+workers[1].kill()
+print(subprocess.run([*command, "--status"], check=True, capture_output=True, text=True).stdout.replace(str(folder), "."))
+assert workers[0].wait() == 0
+with np.load(folder / "sweep" / "ensemble.npz") as found:
+    assert found["max q2"].shape == (32768,) and np.isfinite(found["max q2"]).all()
 
 # %% [markdown]
 # ## What to read next
 #
 # - [Many at once](../docs/many_at_once.md): batches, ensembles, sweeps, executors.
+# - [Sweeps on clusters](../docs/clusters.md): Slurm, Dask, what a sweep will take.

@@ -123,6 +123,11 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
             _number("--count", "count", "motions (default: 1000000)"),
             _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
+    "predictions": Measurement(
+        "symdyn.lab.predictions:run", "dry runs of three sweeps compared with the sweeps; memory in which results are merged", (
+            _number("--rows", "rows", "that are put together (default: 10000000)"),
+            _number("--part", "part", "of the motions of the sweeps (default: 1)", float, "PART"),
+            _number("--jobs", "jobs", "threads of a sweep (default: 1)"))),
     "sensitivities": Measurement(
         "symdyn.lab.sensitivities:run", "derivatives of motions: errors, times compared with CasADi's CVODES and diffrax",
         (_ONLY,)),

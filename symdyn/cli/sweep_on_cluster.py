@@ -193,6 +193,8 @@ def _print_limits(found: list[Limit], count: int) -> None:
 
 def in_small(seconds: float) -> str:
     """A duration in words, also of less than a second."""
+    if seconds < 1e-3:
+        return f"{1e6 * seconds:.3g} µs"
     return f"{1e3 * seconds:.3g} ms" if seconds < 1 else in_time(seconds)
 
 

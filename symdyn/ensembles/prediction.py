@@ -131,6 +131,7 @@ def measure(plan: Plan, folder: Path, cores: int, formats: tuple[str, ...], star
         serial = _serial(plan, taken, motion, cores)
         memory = resident()
         put, merge, exported = _disk(plan, folder, formats)
+        memory = resident() if formats else memory  # other formats bring packages of their own
     return Measured(np.array(alone), motion, serial, put, merge, exported, started, memory, failures / len(alone))
 
 

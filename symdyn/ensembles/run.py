@@ -77,7 +77,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     path        folder for results, written as they come; default: a temporary one, removed with the result
     resume      go on with a run that was stopped, whatever stopped it; the result is the same, to the byte
     shared      processes on any machines that make this call with the same path share the work: each computes chunks that no
-                other one has, and what a process that was killed had begun is taken over. All return the whole result
+                other one has, and what a process that was killed had begun is taken over. They go on with what is there, and
+                all return the whole result
     formats     files that are written next to ensemble.npz: "parquet", "zarr"; see Ensemble.to_parquet and to_zarr
     progress    show a bar (needs tqdm)
     consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
@@ -118,7 +119,7 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
         return run(asked, Path(path), how, resume)
     folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
     try:
-        result = _warned(_in_folder(asked, folder, how, False, False))
+        result = _warned(_in_folder(asked, folder, how, False, False), 3)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -144,10 +145,10 @@ class How:
 
 
 def run(asked: Plan, folder: Path, how: How, resume: bool) -> Ensemble:
-    """Compute what is not there yet; see `ensemble`. Raises StillAtWork if work is shared, and others have not done yet what is
-    left, unless `how.stays`."""
+    """Compute what is not there yet; see `ensemble`, which calls this. Raises StillAtWork if work is shared, and others have not
+    done yet what is left, unless `how.stays`."""
     with OneRun(folder, how.lease is not None):
-        return _warned(_in_folder(asked, folder, how, resume or how.lease is not None, True))
+        return _warned(_in_folder(asked, folder, how, resume or how.lease is not None, True), 4)
 
 
 class StillAtWork(Exception):
@@ -170,10 +171,10 @@ def prepare(asked: Plan, folder: Path, resume: bool) -> tuple[Plan, Store]:
     return asked, Store(folder, asked.samples.count, size, asked.columns)
 
 
-def _warned(result: Ensemble) -> Ensemble:
-    """The same, after a warning of what is doubtful in it."""
+def _warned(result: Ensemble, level: int) -> Ensemble:
+    """The same, after a warning of what is doubtful in it, at the caller so many levels above."""
     if result.doubts:
-        warnings.warn(f"{result.name}: {result.doubts}", SimulationWarning, stacklevel=4)
+        warnings.warn(f"{result.name}: {result.doubts}", SimulationWarning, stacklevel=level)
     return result
 
 
@@ -257,19 +258,19 @@ class _Run:
         """Compute what no other worker has, until all is there and put together."""
         while not self._complete():
             self._compute(self._claimed(claims))
-            if len(self.store.there()) == self.store.n_chunks:
-                if claims.take([MERGE]) is not None and not self._complete():
-                    if not self.store.drop_damaged():
-                        self.shown.write("merging")
-                        self.kept(self._finish)
-                    claims.release(MERGE)
-                    continue
-            elif lost := claims.given_up():
-                raise ExecutorFailed(f"{ATTEMPTS} workers ended while they computed {self._members(lost[0])}, which nobody tries "
-                                     "again: their memory or their time may not suffice; start again with fewer samples in a "
-                                     "chunk, more memory or more time")
+            if len(self.store.there()) == self.store.n_chunks and claims.take([MERGE]) is not None:
+                if not self._complete() and not self.store.drop_damaged():
+                    self.shown.write("merging")
+                    self.kept(self._finish)
+                claims.release(MERGE)
+                continue
+            there = self.store.there()
+            if lost := [piece for piece in claims.given_up() if piece == MERGE or int(piece) not in there]:
+                raise ExecutorFailed(f"{ATTEMPTS} workers ended while they {self._doing(lost[0])}, which nobody tries again: "
+                                     "their memory or their time may not suffice; start again with fewer samples in a chunk, "
+                                     "more memory or more time")
             if not self.how.stays:
-                left = self.store.count - self._count(self.store.there())
+                left = self.store.count - self._count(there)
                 others = f"{left} of {self.store.count} samples at work" if left else "begun to put the results together"
                 raise StillAtWork(f"{self.plan.name}: nothing is left to begin; other workers have {others}")
             clock.sleep(LOOK)
@@ -349,9 +350,11 @@ class _Run:
         return EnsembleStopped(f"{self.plan.name}: the ensemble stopped: {why}; {self._what_is_kept()}", self.n_done,
                                self.store.count)
 
-    def _members(self, piece: str) -> str:
+    def _doing(self, piece: str) -> str:
+        if piece == MERGE:
+            return "put the results together"
         first = int(piece) * self.store.size
-        return f"samples {first} to {first + self.store.samples_in(int(piece)) - 1}"
+        return f"computed samples {first} to {first + self.store.samples_in(int(piece)) - 1}"
 
     def _doubts(self) -> str:
         """What to warn of where derivatives of members are doubtful."""

@@ -106,9 +106,13 @@ class Store:
                 mask[[place for place, _ in self._failures(k)]] = True
                 yield mask
 
+        n_failed = 0
+
         def tell(file: IO[bytes]) -> None:
+            nonlocal n_failed
             for k in range(self.n_chunks):
                 failures = self._failures(k)
+                n_failed += len(failures)
                 values = block(k * self.size, k * self.size + self.samples_in(k)) if failures else np.zeros((0, 0))
                 for place, message in failures:
                     given = {n: v if np.isfinite(v) else str(v) for n, v in zip(names, values[place].tolist(), strict=True)}
@@ -116,7 +120,7 @@ class Store:
                     file.write(json.dumps(line).encode() + b"\n")
 
         write_whole(self.folder / FAILURES, tell)
-        about = {**about, "n_failed": sum(len(self._failures(k)) for k in range(self.n_chunks))}
+        about = {**about, "n_failed": n_failed}
         write_archive(self.folder / RESULT, [
             Entry("samples", (self.count, len(names)), np.dtype(float), samples()),
             *(Entry(label, (self.count, *shape), np.dtype(float), column(label)) for label, shape in self.columns.items()),

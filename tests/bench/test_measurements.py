@@ -79,6 +79,7 @@ def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypat
     (["figures", "--only", "chian"], "there is no group chian of figures; did you mean chain? There are chain, compilation, "),
     (["flexible", "--only", "of_no_kind_at_all"], "there is no group of_no_kind_at_all of figures; there are rotating_beam"),
     (["sweep", "--count", "9"], "9 motions were asked for; pass 10 or more"),
+    (["predictions", "--rows", "9"], "9 rows and the part 1 of the motions were asked for; pass 10 rows or more"),
     (["references", "nothing_of_the_kind"], "there is no mechanism 'nothing_of_the_kind'; there are pendulum"),
     (["extended", "skat"], "did you mean skate"),
     (["extended", "skate", "--t", "nan"], "the end is nan; pass a positive time, s"),

@@ -19,7 +19,7 @@ from symdyn.ensembles import run
 from symdyn.ensembles.claims import ATTEMPTS, Claims, Heartbeat
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.progress import read_status
-from symdyn.errors import ArgumentError, EnsembleStopped
+from symdyn.errors import ArgumentError, EnsembleStopped, SimulationWarning
 from symdyn.runtime.building.recall import recall
 
 
@@ -136,8 +136,9 @@ def chunks_in(folder):
 def test_a_killed_worker_is_replaced_and_a_late_one_helps(tmp_path):
     out = tmp_path / "out"
     first, second = worker(tmp_path, 0.02), worker(tmp_path, 0.05)
+    # One motion of each process is tried in advance.
     while first.poll() is None and second.poll() is None and (
-            chunks_in(out) < 4 or second.pid not in {pid for _, pid in lines(tmp_path)}):
+            chunks_in(out) < 4 or Counter(pid for _, pid in lines(tmp_path))[second.pid] < 2):
         time.sleep(0.005)
     second.send_signal(signal.SIGKILL)
     second.wait()
@@ -149,10 +150,10 @@ def test_a_killed_worker_is_replaced_and_a_late_one_helps(tmp_path):
     assert sorted(p.name for p in out.iterdir()) == ["ensemble.npz", "failures.jsonl", "manifest.json"]
     by = Counter(pid for _, pid in lines(tmp_path))
     assert set(by) == {first.pid, second.pid, late.pid}
-    # Each once, but for the chunk that was begun by the one that was killed.
-    again = [start for start, n in Counter(start for start, _ in lines(tmp_path)).items() if n > 1]
-    assert len(again) <= 3 and len({start for start, _ in lines(tmp_path)}) == 60
+    # Each once, but for the one that is tried in advance, and the chunk that was begun by the one that was killed.
     drawn = sd.Samples({"q1": {"from": -1, "to": 1}}, "random", 60, 2)
+    again = {start for start, n in Counter(start for start, _ in lines(tmp_path)).items() if n > 1}
+    assert len(again - {drawn.block(0, 1)[0, 0]}) <= 3 and len({start for start, _ in lines(tmp_path)}) == 60
     here = sd.ensemble(recall("double_pendulum", {}), drawn, (0, 0.1), {"end": "end q1"}, chunk=3)
     with np.load(out / "ensemble.npz") as found:
         assert np.array_equal(found["samples"], here.samples) and np.array_equal(found["end"], here["end"])
@@ -209,6 +210,32 @@ def test_a_chunk_that_has_ended_three_workers_stops_those_who_share_it(module, t
     with pytest.raises(EnsembleStopped, match=r"3 workers ended while they computed samples 30 to 39, which nobody tries again"
                        r": .*fewer samples in a chunk.*; 30 of 40 samples are kept in"):
         sd.ensemble(module, drawn(), (0, 0.1), chunk=10, path=tmp_path, shared=True)
+
+
+def test_results_are_put_together_by_another_worker_than_the_one_that_was_killed(module, tmp_path):
+    asked = run.plan(module, drawn(), (0, 0.1), chunk=10)
+    run.prepare(asked, tmp_path, False)
+    with Claims(tmp_path, "other", 60) as other:
+        assert other.take([run.MERGE]) == run.MERGE
+        with pytest.raises(run.StillAtWork, match="nothing is left to begin; other workers have begun to put the results"):
+            run.run(asked, tmp_path, run.How(lease=60.0, stays=False), True)
+        age(other, run.MERGE, 70)
+        assert run.run(asked, tmp_path, run.How(lease=60.0), True).count == 40
+    run.prepare(asked, tmp_path / "again", False)
+    for k in range(ATTEMPTS):
+        dead = Claims(tmp_path / "again", f"dead{k}").__enter__()
+        dead.take([run.MERGE])
+        age(dead, run.MERGE, 500)
+    with pytest.raises(EnsembleStopped, match=r"3 workers ended while they put the results together, which nobody tries again"):
+        run.run(asked, tmp_path / "again", run.How(lease=60.0), True)
+
+
+def test_a_warning_is_given_where_the_ensemble_was_asked_for(module, tmp_path, monkeypatch):
+    monkeypatch.setattr(run._Run, "_doubts", lambda self: "doubtful")
+    for path in (None, tmp_path / "a"):
+        with pytest.warns(SimulationWarning, match="double_pendulum: doubtful") as record:
+            sd.ensemble(module, drawn(), (0, 0.1), path=path)
+        assert [warning.filename for warning in record] == [__file__]
 
 
 def test_a_worker_that_does_not_stay_leaves_what_others_have(module, tmp_path):
