@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -132,6 +133,9 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
     print(f"{plan.name}: Slurm's job {job} with {counted(cluster.workers or 1, 'worker')} computes "
           f"{counted(store.count, 'sample')} in {counted(store.n_chunks, 'chunk')}")
     print(f"  predicted: {in_time(found.wall)}, {found.core / 3600:.3g} core hours, once all workers are there")
+    if cluster.time is not None and cluster.time < found.wall:
+        print(f"  the time limit of {in_time(cluster.time)} ends before: go on with --resume, about "
+              f"{counted(math.ceil(found.wall / cluster.time), 'time')} in all, or ask for more workers or more time")
     print(f"  symdyn sweep {arguments.file} --status --output {folder} shows how far it is; scancel {job} stops it")
     return 0
 

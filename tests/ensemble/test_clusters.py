@@ -302,6 +302,16 @@ def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, ta
     assert not list(queue.iterdir()) and not (tmp_path / "out").exists()
 
 
+def test_a_time_limit_that_is_too_short_for_all_is_no_fault(tmp_path, capsys, queue, monkeypatch):
+    monkeypatch.setattr(slurm, "submit", lambda folder, text: "7")
+    predict = prediction.predict
+    monkeypatch.setattr(prediction, "predict", lambda *given: replace(predict(*given), wall=1000.0))
+    path = write(tmp_path, table="[cluster]\nkind = \"slurm\"\ntime = 00:05:00\n")
+    assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert "the time limit of 5 min ends before: go on with --resume, about 4 times in all, or ask for more workers" in told
+
+
 # -- what is predicted
 
 
