@@ -61,8 +61,9 @@ def _configured() -> str | None:
 
 
 def _host(address: str) -> str:
-    """The host of an address such as tcp://host:8786."""
-    return address.partition("://")[2].rpartition(":")[0]
+    """The host of an address such as tcp://host:8786, or host:8786."""
+    _, protocol, place = address.partition("://")
+    return (place if protocol else address).rpartition(":")[0]
 
 
 def show_status(folder: Path, cluster: Cluster | None) -> int:

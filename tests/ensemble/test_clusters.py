@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import signal
@@ -137,6 +138,20 @@ def test_a_command_that_contradicts_the_file_or_itself(tmp_path, capsys, monkeyp
     assert main(["sweep", write(tmp_path, more), "--output", str(tmp_path / "out"), *arguments]) == 2
     told = capsys.readouterr().err
     assert message in told and not (tmp_path / "out").exists(), told
+
+
+@pytest.mark.parametrize("address, here", [
+    ("tcp://127.0.0.1:8786", True), ("localhost:8786", True), ("tls://[::1]:8786", True), ("tcp://127.0.0.1.example:1", False),
+    ("tcp://localhost:1@far:2", False), ("tcp://far://127.0.0.1:1", False), ("inproc://10.0.0.1/1/1", False), ("far", False),
+    ("tcp://localhost@far:1", False)])
+def test_which_schedulers_a_file_may_name(address, here, monkeypatch):
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    given = argparse.Namespace(workers=3, dask=None, dry_run=False, join=False)
+    for confirmed, fine in ((None, here), (address, True)):
+        faults = []
+        given.dask = confirmed
+        found = sweep_on_cluster.with_scheduler(given, Cluster("dask", address=address), faults)
+        assert (not faults) == fine and found.address == address and found.workers == 3
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "x", "1.5", "1e30", "nan"])
