@@ -258,7 +258,7 @@ class _Run:
         """Compute what no other worker has, until all is there and put together."""
         while not self._complete():
             self._compute(self._claimed(claims))
-            if len(self.store.there()) == self.store.n_chunks and claims.take([MERGE]) is not None:
+            if len(self._look()) == self.store.n_chunks and claims.take([MERGE]) is not None:
                 if not self._complete() and not self.store.drop_damaged():
                     self.shown.write("merging")
                     self.kept(self._finish)
@@ -275,12 +275,17 @@ class _Run:
                 raise StillAtWork(f"{self.plan.name}: nothing is left to begin; other workers have {others}")
             clock.sleep(LOOK)
 
+    def _look(self) -> set[int]:
+        """Which chunks are there, of all workers; the bar shows it."""
+        there = self.store.there()
+        if self.bar is not None:
+            self.bar.update(self._count(there) - self.bar.n)
+        return there
+
     def _claimed(self, claims: Claims) -> Iterator[Chunk]:
         """Chunks that this worker has claimed, as long as there are any; each begins somewhere else, so that few try the same."""
         while True:
-            there = self.store.there()
-            if self.bar is not None:  # of all workers
-                self.bar.update(self._count(there) - self.bar.n)
+            there = self._look()
             left = [f"{k:08d}" for k in range(self.store.n_chunks) if k not in there]
             cut = random.randrange(len(left)) if left else 0
             piece = claims.take([*left[cut:], *left[:cut]])

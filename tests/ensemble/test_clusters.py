@@ -307,7 +307,9 @@ def test_workers_are_not_submitted_twice(tmp_path, capsys, queue):
      "for one chunk of 20 motions: it would end before anything is kept; ask for more time, or a smaller chunk",
      "cluster.memory: 1 MB (1000000 bytes) are asked for, but a worker is predicted to take"]),
     ("memory = \"2 MB\"", ["sweep.toml: cluster.memory: 2 MB"])])
-def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, table, messages):
+def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, monkeypatch, table, messages):
+    measure = prediction.measure
+    monkeypatch.setattr(prediction, "measure", lambda *given: replace(measure(*given), start=2.0, memory=10**8))
     path = write(tmp_path, table=f"[cluster]\nkind = \"slurm\"\n{table}\n")
     for command in (["--dry-run"], []):
         assert main(["sweep", path, "--output", str(tmp_path / "out"), *command]) == 2

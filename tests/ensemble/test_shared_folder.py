@@ -138,7 +138,7 @@ def test_a_killed_worker_is_replaced_and_a_late_one_helps(tmp_path):
     first, second = worker(tmp_path, 0.02), worker(tmp_path, 0.05)
     # One motion of each process is tried in advance.
     while first.poll() is None and second.poll() is None and (
-            chunks_in(out) < 4 or Counter(pid for _, pid in lines(tmp_path))[second.pid] < 2):
+            chunks_in(out) < 4 or min(Counter(pid for _, pid in lines(tmp_path))[k.pid] for k in (first, second)) < 2):
         time.sleep(0.005)
     second.send_signal(signal.SIGKILL)
     second.wait()
@@ -228,6 +228,18 @@ def test_results_are_put_together_by_another_worker_than_the_one_that_was_killed
         age(dead, run.MERGE, 500)
     with pytest.raises(EnsembleStopped, match=r"3 workers ended while they put the results together, which nobody tries again"):
         run.run(asked, tmp_path / "again", run.How(lease=60.0), True)
+
+
+def test_the_bar_of_each_counts_what_all_have_done(module, tmp_path, capsys):
+    asked = run.plan(module, drawn(), (0, 0.1), chunk=10)
+    run.prepare(asked, tmp_path, False)
+    with Claims(tmp_path, "other", 60) as other:
+        other.take(["00000001"])
+        with pytest.raises(run.StillAtWork):
+            run.run(asked, tmp_path, run.How(lease=60.0, stays=False, progress=True), True)
+    assert "30/40" in capsys.readouterr().err
+    sd.ensemble(module, drawn(), (0, 0.1), chunk=10, path=tmp_path, shared=True, progress=True)
+    assert "40/40" in capsys.readouterr().err
 
 
 def test_a_warning_is_given_where_the_ensemble_was_asked_for(module, tmp_path, monkeypatch):
