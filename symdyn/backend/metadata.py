@@ -207,6 +207,7 @@ class ModuleMetadata(Metadata):
     events, event_leaves   see EventRecord; entries of [t; x; inputs] whose ranges bound events
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
+    surroundings           what contacts touch and how mooring lines hang, likewise
     connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line",
                            "rope")
     acting                 forces and torques of loads, row by row of applied_loads: name, body, kind ("force", "torque")
@@ -237,6 +238,7 @@ class ModuleMetadata(Metadata):
     switches: tuple[JumpRecord, ...] = ()
     not_smooth: str = ""
     drawn: tuple[Mapping[str, Any], ...] = ()
+    surroundings: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     connections: tuple[tuple[str, str, str, str], ...] = ()
     acting: tuple[tuple[str, str, str], ...] = ()

@@ -85,6 +85,7 @@ class Equations:
     joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
+    surroundings what contacts touch and how mooring lines hang, likewise: their entries come after those of `drawn`
     down         direction of gravity, zero where there is none
     connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force, line, rope)
     acting       forces and torques of loads on bodies, in the order of the quantity applied_loads: name, body, kind
@@ -119,6 +120,7 @@ class Equations:
     joints: tuple[tuple[str, str, str, str], ...] = ()
     otherwise: Equations | None = None
     drawn: tuple[Mapping[str, Any], ...] = ()
+    surroundings: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     connections: tuple[tuple[str, str, str, str], ...] = ()
     acting: tuple[tuple[str, str, str], ...] = ()

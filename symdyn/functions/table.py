@@ -108,7 +108,7 @@ FUNCTIONS = _entries(
     ("reset_directions", "reset_directions", None, "changes of [q; u] along each coordinate and speed that events reset",
      "events with resets"),
     ("switches", "switches", None, "what passes zero where the right-hand side may jump", "jumps"),
-    ("drawn_lengths", "drawn_lengths", None, "lengths in pictures that follow from parameters, m", "shapes"),
+    ("drawn_lengths", "drawn_lengths", None, "lengths and other numbers of pictures that follow from parameters, m", "shapes"),
     ("jacobian_x", "jacobian_x", ("n_x", "n_x"), "exact derivative of x_dot by x", ""),
     ("jacobian_inputs", "jacobian_inputs", ("n_x", "n_in"), "exact derivative of x_dot by the inputs", ""),
     ("jacobian_params", "jacobian_params", ("n_x", "n_p"), "exact derivative of x_dot by the parameters", ""),

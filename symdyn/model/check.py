@@ -27,6 +27,7 @@ from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.points import Point
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model
+from symdyn.model.surroundings import surroundings_of
 from symdyn.model.symbol_check import check_coordinates, check_symbols, chosen_speeds, spelling, symbols_in
 from symdyn.model.symbols import GivenAcceleration, GivenRate, finite, take_over, time
 from symdyn.model.uses import unit_of, units_of, uses
@@ -107,7 +108,8 @@ class _Checker:
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             constraints, tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), units,
-            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.compliant_contacts), tuple(s.lowered_groups),
+            tuple(s.shapes), surroundings_of(s, self.loads, self.parameters), self.events, distinct, tuple(s.rigid_contacts),
+            tuple(s.compliant_contacts), tuple(s.lowered_groups),
             tuple(s.chosen_speeds.items()), self.own_speeds if s.chosen_speeds else (), self.eliminated)
 
     # -- names

@@ -38,7 +38,7 @@ class Model:
     parameters, inputs   symbols in the order of first use
     defaults      number for each parameter that has one; initial: for coordinates, speeds, states, inputs
     units         symbol -> unit
-    shapes        what bodies look like
+    shapes        what bodies look like; surroundings: what contacts touch and how mooring lines hang, for pictures
     doubts        sentences on what is possible, but hardly meant
     contacts      rigid ones, place by place; their forces are among the loads, their events among the events; compliant: likewise
     groups        of contacts whose pairs are found along a motion
@@ -68,6 +68,7 @@ class Model:
     duration: float
     units: Mapping[sp.Symbol, str]
     shapes: tuple[Drawn, ...] = ()
+    surroundings: tuple[Drawn, ...] = ()
     events: tuple[Event, ...] = ()
     doubts: tuple[str, ...] = ()
     contacts: tuple[RigidContact, ...] = ()

@@ -172,12 +172,6 @@ def largest(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(np.nan_to_num(vectors), axis=-1).max(initial=0.0))
 
 
-def floor_of(at: np.ndarray, up: np.ndarray, near: float) -> float | None:
-    """How high the flat ground is on which all contacts touch that do; None where they touch at several heights."""
-    heights = (at @ up)[np.isfinite(at).all(axis=2)]
-    return float(np.median(heights)) if len(heights) and np.ptp(heights) <= near else None
-
-
 def straight(tails: np.ndarray, ways: np.ndarray, heads: int = 1, longest: float = np.inf) -> np.ndarray:
     """Arrows as one curve (m, 2 or 3), lifted between them; from tails (n, 2 or 3) by ways; a torque has two heads.
 

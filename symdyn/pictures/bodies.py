@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from symdyn.errors import ArgumentError
 from symdyn.pictures.arrows import TITLES
 from symdyn.pictures.drawing import Drawing
+from symdyn.pictures.grounds import COLOR
 from symdyn.pictures.looks import color_of_body
 from symdyn.pictures.scene import Scene
 from symdyn.pictures.skeleton import Skeleton
@@ -25,8 +27,8 @@ VIEW = (22.0, -55.0)
 VIEW_OF_SOLIDS = (14.0, -58.0)
 # Of the axes' box before it is fitted.
 ZOOM = 0.79
-# Of flat ground, of the extent of the picture.
-_THICK = 0.015
+# Of flat ground, of the extent of the picture; how far its normal may be off a plane picture.
+_THICK, _UPRIGHT = 0.015, 1e-6
 # Of the legend of arrows: width of an entry and height of a line, inches.
 _ENTRY, _LINE = 2.0, 0.16
 # Width of a letter of the axes' numbers, points.
@@ -71,11 +73,20 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
         axes.locator_params(axis="x", nbins=int(np.clip(7 * spans[0] / spans[1], 2, 6)))
         axes.grid(True, color="0.92", linewidth=0.7)
         axes.set_axisbelow(True)
-        if drawing.ground is not None and below in drawing.axes:
-            level = drawing.ground * drawing.up[below]
-            (axes.axhspan if drawing.axes[1] == below else axes.axvspan)(
-                level, level - _THICK * drawing.up[below] * float(np.ptp(limits)), color="0.78", linewidth=0)
+        for corners in _strips(drawing, limits):
+            axes.add_patch(Polygon(corners, facecolor=COLOR, linewidth=0))
     return axes
+
+
+def _strips(drawing: Drawing, limits: np.ndarray) -> Iterator[np.ndarray]:
+    """Planes of the ground that are seen from their edge, from one end of a plane picture to the other, (4, 2)."""
+    middle, far = limits.mean(axis=1), 2 * float(np.ptp(limits))
+    for normal, level in drawing.planes:
+        n = normal[drawing.axes]
+        if abs(np.linalg.norm(n) - 1) < _UPRIGHT:
+            at, along = middle + (level - n @ middle) * n, far * np.array([-n[1], n[0]])
+            down = -_THICK * float(np.ptp(limits)) * n
+            yield np.array([at - along, at + along, at + along + down, at - along + down])
 
 
 def _fill(axes: Any, limits: np.ndarray) -> None:

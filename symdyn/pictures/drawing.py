@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symdyn.pictures.arrows import Arrows, arcs, arrows_of, floor_of, straight, touching
+from symdyn.pictures.arrows import Arrows, arcs, arrows_of, straight, touching
+from symdyn.pictures.grounds import Ground
 from symdyn.pictures.looks import carriers, up_of
 from symdyn.pictures.points import points_of
 from symdyn.pictures.skeleton import Skeleton, bare_skeleton, connect, guess_skeleton
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 _LEFT_OUT = 1e-9
-# Contacts at heights that differ by less touch a flat ground; of how far all goes.
-_FLAT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class Drawing:
     sticks     lines of bodies without shapes where joints are not listed, so that these have no look of their own, else None
     bare       the bodies without shapes
     arrows     of forces and torques
-    up         the direction that is above; ground: how high the flat ground is on which contacts touch, if they do
+    up         the direction that is above; planes: of the ground that contacts have
     """
 
     points: np.ndarray
@@ -85,7 +84,7 @@ class Drawing:
     bare: Sequence[int]
     arrows: Sequence[Drawn]
     up: tuple[float, float, float]
-    ground: float | None
+    planes: Sequence[Ground]
 
     @property
     def axes(self) -> list[int]:
@@ -136,7 +135,7 @@ class Drawing:
         return cls(points[..., shown], centres[..., shown], ["xyz"[k] for k in shown], solids,
                    None if sticks is None else sticks.in_axes(shown), bare,
                    [Drawn.of(one, shown) for one in arrows_of(solution, length, forces)], up,
-                   floor_of(touches, np.array(up), _FLAT * float(ranges.max())))
+                   solids.planes if solids is not None else ())
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from symdyn.pictures.looks import Item, Mechanism, looks_of
 from symdyn.pictures.mechanism import Hung, Posed
 from symdyn.pictures.meshes import Part, box, line, sweep
-from symdyn.pictures.ropes import POINTS, rope
+from symdyn.pictures.ropes import POINTS, mooring, rope
 
 # Bands of a ball, and the turns of a coil with their points.
 _BANDS = 8
@@ -45,6 +45,9 @@ class Form:
         a = posed.at(item.ends[0])
         if item.kind == "rope":
             return rope(a, posed.at(item.ends[1]), item.size[1], up)
+        if item.kind == "mooring":
+            _, shown, length, give, friction, seabed = item.size
+            return mooring(a, posed.at(item.ends[1]), length, give, friction, bool(seabed), shown)
         if item.kind == "ball":
             return np.asarray(a + item.size[0] * own)
         if item.kind in ("block", "box"):
@@ -135,7 +138,7 @@ def _forms(item: Item) -> list[Form]:
         return [Form(rod, item, radii=(size[0], size[1]))]
     if item.kind in ("thread", "line"):
         return [Form(line(body, color, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), _THREAD), item)]
-    if item.kind == "rope":
+    if item.kind in ("rope", "mooring"):
         return [Form(line(body, color, np.zeros((POINTS, 3)), _THREAD), item)]
     found = []
     if item.kind in ("spring", "both"):

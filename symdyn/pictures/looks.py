@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.pictures.grounds import Ground
+from symdyn.pictures.grounds import COLOR, Reach, Surroundings, surroundings_of
 from symdyn.shown import shown
 
 GROUND = -1
@@ -67,7 +67,7 @@ class Mechanism:
     corners       points that contacts have on bodies: body, (3,) in its axes; wheels: radii of bodies that touch with a rim, m
     ropes         lengths of ropes, m, by the names of their connections
     way           how far the mechanism gets in a motion, m; 0 where it is not known
-    grounds       planes of the ground that contacts have: the normal, and normal @ point of their points, m
+    around        what contacts touch, and how mooring lines hang
     """
 
     bodies: Sequence[str]
@@ -88,7 +88,7 @@ class Mechanism:
     wheels: Mapping[int, float] = field(default_factory=dict)
     ropes: Mapping[str, float] = field(default_factory=dict)
     way: float = 0.0
-    grounds: Sequence[Ground] = ()
+    around: Surroundings = field(default_factory=Surroundings)
 
     @property
     def points(self) -> np.ndarray:
@@ -169,6 +169,22 @@ def drawn_otherwise(about: Any, joints: Sequence[str], joined: Sequence[tuple[st
     return frozenset({k for k, name in enumerate(about.bodies) if name in names} | carriers(about.bodies, joints, joined))
 
 
+def with_surroundings(m: Mechanism, records: Sequence[Mapping[str, Any]], drawn: Sequence[Mapping[str, Any]], frames: np.ndarray,
+                      further: float = 0.0, coarse: bool = False) -> Mechanism:
+    """A mechanism with what is around it.
+
+    records   of the surroundings, with numbers in place of None; drawn: those of the user's shapes
+    frames    of the bodies at some configurations, (n, n_b, 12); further: how far beyond these places they may get, of its length
+    coarse    whether few facets are wanted
+    """
+    if not records:
+        return m
+    own = any(record["body"] == "ground" and record["kind"] not in ("line", "water") for record in drawn)
+    centres = np.array([m.centre(body) for body in range(len(m.bodies))]).reshape(-1, 3)
+    reach = Reach(m.bodies, frames, centres, m.planar, length_of(m), color_of_body, further, coarse)
+    return replace(m, around=surroundings_of(records, reach, own))
+
+
 def carriers(bodies: Sequence[str], joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> set[int]:
     """Indices of the massless bodies that joints in loops have been given; joined: the two bodies of each joint."""
     made = {f"{name}_carrier" for name in joints} - {name for pair in joined for name in pair}
@@ -188,8 +204,9 @@ def up_of(down: Sequence[float], planar: bool) -> tuple[float, float, float]:
 class Item:
     """A solid: its kind, what it hangs on, its sizes in m, its colour, what it is called.
 
-    kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc; line: of a mooring, whose second
-            size is how much of it a still shows; rope: whose second size is its length, over which it sags
+    kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc; line: straight to where it is
+            anchored, whose second size is how much of it a still shows; mooring: likewise, which hangs: its length, weight over
+            EA, friction and whether there is a seabed follow; rope: whose second size is its length, over which it sags
     axis    index of the joint's axis; turn: (9,), own axes in body axes, of boxes and ellipsoids, row by row
     layer   "" for what is always shown, else what shows it: "inertia", "centres"
     """
@@ -207,18 +224,22 @@ class Item:
 
 def looks_of(m: Mechanism) -> tuple[list[Item], float]:
     """The solids of a mechanism, and its length, m."""
-    length = _length(m)
+    length = length_of(m)
     r = _RADIUS * length * (1.0 if len(m.bodies) <= 8 else 0.7)
-    carriers = m.carriers
+    carriers, cams = m.carriers, {part.body for part in m.around.parts if not part.ground}
     items = [*_joints(m, r, length, carriers), *_springs(m, r, length)]
     for body in range(len(m.bodies)):
-        if body not in m.drawn and body not in carriers:
+        if body not in m.drawn and body not in carriers and not (body in cams and len(_attached(m, body, length)) < 2):
             items += [replace(item, body=body) for item in _body(m, body, r, length)]
         items += [replace(item, body=body) for item in _on_request(m, body, r, length)]
+    for body, center, radius in m.around.balls:
+        if body not in m.wheels and body not in m.drawn:
+            color, name = (COLOR, "ground") if body == GROUND else (color_of_body(body), m.bodies[body])
+            items.append(Item("ball", ((body, *center),), (radius,), color, name, body))
     return items, length
 
 
-def _length(m: Mechanism) -> float:
+def length_of(m: Mechanism) -> float:
     """How far points of the mechanism are apart, at most; of a single body its size, from its inertia. Bodies without any extent
     are seen on their way."""
     apart = float(np.linalg.norm(np.ptp(m.near_points, axis=0)))
@@ -284,6 +305,11 @@ def _springs(m: Mechanism, r: float, length: float) -> Iterator[Item]:
         ends = (first + 2 * k, first + 2 * k + 1)
         if kind == "rope":
             yield Item("rope", ends, (0.3 * r, m.ropes.get(name, 0.0)), STEEL, name)
+            continue
+        if kind == "line" and name in m.around.lines:
+            hangs = m.around.lines[name]
+            size = (0.2 * r, _LINE * length, hangs.length, hangs.give, hangs.friction, float(hangs.seabed))
+            yield Item("mooring", ends, size, STEEL, f"{name} (mooring line)")
             continue
         size = (0.3 * r,) if kind == "force" else (0.2 * r, _LINE * length) if kind == "line" else (1.3 * r,)
         yield Item("thread" if kind == "force" else kind, ends, size, STEEL,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.pictures.arrows import POINTS
-from symdyn.pictures.looks import GROUND, Mechanism, Ref, drawn_otherwise, point_of, ropes_of
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, drawn_otherwise, point_of, ropes_of, with_surroundings
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
@@ -96,7 +96,23 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
     gaps = at("contact_gaps", 1).ravel()[:4 * len(about.contacts):4].tolist()
     ropes = ropes_of([c.name for c in about.contacts], found.connections, gaps, springs) if len(gaps) else {}
     way = float(np.linalg.norm(np.ptp(frames[..., :3], axis=(0, 1))))
-    return replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels, way=way)
+    found = replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels, way=way)
+    around = list(filled([*about.drawn, *about.surroundings], lengths_of(solution)))[len(about.drawn):]
+    return with_surroundings(found, around, about.drawn, frames[np.unique(np.linspace(0, len(frames) - 1, _ROWS).astype(int))])
+
+
+def lengths_of(solution: Solution) -> np.ndarray:
+    """The lengths in pictures that follow from the parameters of the run, in order."""
+    if "drawn_lengths" not in solution.module.functions:
+        return np.zeros(0)
+    return solution.module.evaluate("drawn_lengths", solution.t[0], solution.x[0], solution.params, solution.inputs[0]).ravel()
+
+
+def filled(records: Sequence[Mapping[str, Any]], lengths: np.ndarray) -> list[Mapping[str, Any]]:
+    """The records with lengths in place of None, in order."""
+    left = iter(lengths)
+    return [{**record, "values": {name: [[next(left) if e is None else e for e in row] for row in rows]
+                                  for name, rows in record["values"].items()}} for record in records]
 
 
 def _touching(solution: Solution, m: Mechanism, frames: np.ndarray) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:

@@ -28,6 +28,7 @@ class Part:
     edges      (k, 4): two vertices, two faces (-1: none); creases: (k,), drawn from every side, others as outlines alone
     convex     whether it is; of any other, triangles are drawn by their distance, and `hidden` is a box around it
     width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another
+    ground     whether it is what bodies stand on: seen from both sides, behind all that the eye above it sees
     """
 
     body: int
@@ -42,6 +43,7 @@ class Part:
     width: float = 0.4
     to: int | None = None
     convex: bool = True
+    ground: bool = False
 
 
 def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None = None, bends: bool = False) -> Iterator[Part]:
@@ -102,13 +104,61 @@ def line(body: int, color: Color, points: np.ndarray, width: float, to: int | No
 
 
 def _triangles(body: int, color: Color, vertices: np.ndarray, faces: np.ndarray) -> Part:
-    """Triangles of any form, and the corners of the box around them, which no triangle has."""
+    """Triangles of any form."""
+    return _boxed(body, color, vertices, tuple(faces), np.zeros((0, 4), dtype=int))
+
+
+def ribbon(body: int, color: Color, points: np.ndarray, away: np.ndarray, half: float, ground: bool = True) -> Part:
+    """A curve of a plane as a band from points (n, 3), which has what touches it on its left, to away from there, (3,) or (n, 3);
+    half: of its width across the plane, m."""
+    up, n = np.array([0.0, 0.0, half]), len(points)
+    vertices = np.stack([points + up, points - up, points + away - up, points + away + up], axis=1).reshape(-1, 3)
+    rows = np.arange(n - 1)[:, None] * 4
+    pairs = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    faces = np.concatenate([rows + [a, a + 4, b + 4, b] for a, b in pairs])
+    first = rows // 4  # faces of a pair: those of another are n - 1 later
+    edges = np.concatenate([np.column_stack([rows + k, rows + k + 4, first + (n - 1) * k, first + (n - 1) * ((k - 1) % 4)])
+                            for k in range(4)])
+    return _boxed(body, color, vertices, tuple(faces), edges, ground)
+
+
+def sheet(body: int, color: Color, grid: np.ndarray, every: int) -> Part:
+    """A surface through points (n, m, 3), as far as they are finite, with every so many rows and columns as lines."""
+    n, m = grid.shape[:2]
+    vertices, finite = grid.reshape(-1, 3), np.isfinite(grid).all(axis=2).ravel()
+    at = np.arange(n * m).reshape(n, m)
+    faces = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = faces[finite[faces].all(axis=1)]
+    rows = [at[k, [i, i + 1]] for k in {*range(0, n, every), n - 1} for i in range(m - 1)]
+    columns = [at[[i, i + 1], k] for k in {*range(0, m, every), m - 1} for i in range(n - 1)]
+    lines = np.array([*rows, *columns])
+    lines = lines[finite[lines].all(axis=1)]
+    place = np.cumsum(finite) - 1
+    edges = np.column_stack([place[lines], np.full((len(lines), 2), -1)])
+    return _boxed(body, color, vertices[finite], tuple(place[faces]), edges, True)
+
+
+def prism(body: int, color: Color, outline: np.ndarray, half: float) -> Part:
+    """What is within a closed curve (n, 3), counter-clockwise around the origin, which sees all of it; half its thickness."""
+    n, up = len(outline), np.array([0.0, 0.0, half])
+    vertices = np.concatenate([outline + up, outline - up, [up, -up]])
+    a = np.arange(n)
+    b = (a + 1) % n
+    front, back = np.column_stack([0 * a + 2 * n, a, b]), np.column_stack([0 * a + 2 * n + 1, b + n, a + n])
+    edges = np.concatenate([np.column_stack([a, b, a, 2 * n + a]), np.column_stack([a + n, b + n, n + a, 2 * n + a])])
+    return _boxed(body, color, vertices, (*front, *back, *np.column_stack([a, a + n, b + n, b])), edges)
+
+
+def _boxed(body: int, color: Color, vertices: np.ndarray, faces: tuple[np.ndarray, ...], edges: np.ndarray,
+           ground: bool = False) -> Part:
+    """Triangles and quadrilaterals of any form, and the corners of the box around them, which none of them has."""
     ends = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in range(2) for j in range(2) for k in range(2)])
     sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]) + len(vertices)
     every = np.vstack([vertices, corners])
-    return Part(body, color, every, every, tuple(faces), faces[:, [0, 0, 1, 2]], sides, np.zeros((0, 4), dtype=int),
-                np.zeros(0, dtype=bool), convex=False)
+    four = np.array([[face[k * len(face) // 4] for k in range(4)] for face in faces], dtype=int).reshape(-1, 4)
+    return Part(body, color, every, every, faces, four, sides, edges, np.ones(len(edges), dtype=bool), convex=False,
+                ground=ground)
 
 
 def box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np.ndarray | None = None) -> Iterator[Part]:

@@ -1,8 +1,17 @@
-"""A rope without stiffness between two points: straight while it is taut, else the catenary of its length."""
+"""Ropes and mooring lines between two points, as they hang.
+
+A rope has no stiffness: it is straight while it is taut, else the catenary of its length. A mooring line has the shape that its
+load computes, see symdyn.tape.catenary.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+
+from symdyn.tape.algorithms.catenary import symdyn_line_force
+from symdyn.tape.catenary import CLOSE, NEAREST, TINY
 
 # Shorter than its length by less, of it, is taut; points along a rope.
 _TAUT = 1e-5
@@ -38,3 +47,37 @@ def rope(a: np.ndarray, b: np.ndarray, length: float, up: np.ndarray) -> np.ndar
     x = lowest + c * np.arcsinh((s * length + c * np.sinh(-lowest / c)) / c)
     height = c * (np.cosh((x - lowest) / c) - np.cosh(lowest / c))
     return np.asarray(a + across * (x / h) + up * height)
+
+
+def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float, friction: float, seabed: bool,
+            shown: float = np.inf) -> np.ndarray:
+    """Points along a mooring line from its fairlead to its anchor, (POINTS, 3), evenly by its unstretched length.
+
+    give    weight over EA; friction: with the seabed, where there is one; shown: how much of the line, from the fairlead, m
+    Straight where no shape at rest is found, as where the fairlead is below the seabed.
+    """
+    way = fairlead - anchor
+    x, z = math.hypot(way[0], way[1], 2 * length * NEAREST) / length, float(way[2]) / length
+    found = symdyn_line_force(math, int(seabed), (x, z, give, friction), TINY, CLOSE)
+    share = min(1.0, shown / length)
+    if found is None:
+        return np.asarray(fairlead - np.linspace(0.0, share, POINTS)[:, None] * way)
+    h, v = found
+    lies, b = (max(1 - v, 0.0), max(v - 1, 0.0)) if seabed else (0.0, v - 1)
+    tense = min(lies, h / friction) if friction else lies
+
+    def stretch(u: np.ndarray) -> np.ndarray:
+        """Of what lies within a length u of where the line touches down, over `give`."""
+        return np.asarray(h * np.minimum(u, tense) - friction / 2 * np.minimum(u, tense) ** 2)
+
+    s = np.linspace(1.0, 1.0 - share, POINTS)
+    on, up = np.minimum(s, lies), np.maximum(s - lies, 0.0)
+    force = b + up  # the vertical one, over the weight of the line
+    along = on + give * (stretch(np.array(lies)) - stretch(lies - on))
+    if h > 0:
+        along = along + h * (np.arcsinh(force / h) - math.asinh(b / h)) + give * h * up
+    elif lies:  # slack: what lies is not pulled tight
+        along = on * x / lies
+    height = np.sqrt(h**2 + force**2) - math.hypot(h, b) + give * up * (b + up / 2)
+    level = np.array([way[0], way[1], 0.0]) / (math.hypot(way[0], way[1]) or 1.0)
+    return np.asarray(anchor + length * (along[:, None] * level + height[:, None] * [0.0, 0.0, 1.0]))

@@ -57,10 +57,13 @@ class Scene(PolyCollection):
         water = self._solids.water if self._spatial else None
         low, high = _Pieces(self._opacity), _Pieces(self._opacity)
         light = _light(camera.toward(np.concatenate(self._places).mean(axis=0)), self._up) if self._places else np.zeros(3)
-        for k in order(self._solids.parts, self._places, camera):
+        for k in self._order(camera):
             part, places = self._solids.parts[k], self._places[k]
             normals, offsets = planes(places, part.corners)
-            seen = np.append((camera.side(normals, offsets) > 0) & normals.any(axis=1), False)
+            sides = camera.side(normals, offsets)
+            if part.ground:  # it has no inside
+                normals, sides = normals * np.sign(sides)[:, None], np.abs(sides)
+            seen = np.append((sides > 0) & normals.any(axis=1), False)
             faces, own = np.flatnonzero(seen), part.edges[:, 2:]
             if not part.convex:
                 way = camera.toward(places.mean(axis=0))
@@ -93,6 +96,13 @@ class Scene(PolyCollection):
         self.set_facecolor(colors)
         self.set_edgecolor(colors)
         self.set_linewidth([width for pieces in together for width in pieces.widths])
+
+    def _order(self, camera: Camera) -> list[int]:
+        """The parts from back to front: the ground behind all that is on it."""
+        parts = self._solids.parts
+        ground = [k for k, part in enumerate(parts) if part.ground]
+        others = [k for k, part in enumerate(parts) if not part.ground]
+        return [*ground, *[others[k] for k in order([parts[k] for k in others], [self._places[k] for k in others], camera)]]
 
     def _surface(self, water: Water, camera: Camera) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """The water's rectangle, or its strips along the crests of waves from back to front: corners (n, 3) and colour."""

@@ -12,8 +12,9 @@ from matplotlib.colors import to_rgb
 from symdyn.errors import ArgumentError
 from symdyn.pictures.bending import Bending, bendings
 from symdyn.pictures.forms import Forms
+from symdyn.pictures.grounds import Ground
 from symdyn.pictures.looks import color_of_body
-from symdyn.pictures.mechanism import mechanism_of
+from symdyn.pictures.mechanism import filled, lengths_of, mechanism_of
 from symdyn.pictures.meshes import Part, beam, parts_of
 from symdyn.shown import shown
 
@@ -65,6 +66,7 @@ class Solids:
     times       (n_t,), s
     forms       what bodies, joints and springs look like by themselves; None where joints are not listed
     origins     (n_t, n_b + 1, 3) and rotations (n_t, n_b + 1, 3, 3), the last the ground's; bodies: those that have shapes
+    planes      of the ground that contacts have
     """
 
     own: Sequence[Part]
@@ -75,6 +77,8 @@ class Solids:
     rotations: np.ndarray
     bodies: frozenset[int]
     times: np.ndarray
+    planar: bool
+    planes: Sequence[Ground]
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -92,7 +96,8 @@ class Solids:
         frames = solution.rows("frames").reshape(len(solution.t), -1, 12)
         if not np.isfinite(frames).all():
             return None
-        forms = Forms.of(mechanism_of(solution, frames, int(solution.t.argmin()))) if jointed else None
+        mechanism = mechanism_of(solution, frames, int(solution.t.argmin()))
+        forms = Forms.of(mechanism) if jointed else None
         length = forms.length if forms is not None else float(np.ptp(frames[..., :3], axis=(0, 1)).max(initial=0.0))
         still = np.concatenate([np.zeros(3), np.eye(3).ravel()])
         frames = np.concatenate([frames, np.broadcast_to(still, (len(frames), 1, 12))], axis=1)
@@ -114,8 +119,12 @@ class Solids:
                 parts.append(beam(body, colors[body], bent[body].points, length))
                 bending.append(bent[body].of(parts[-1]))
         bodies = {part.body for part in parts}
+        around = [*mechanism.around.parts, *mechanism.around.floors]
+        parts += around
+        bending += [None] * len(around)
         rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)
-        return cls(parts, bending, forms, water, frames[..., :3], rotations, frozenset(bodies), solution.t)
+        return cls(parts, bending, forms, water, frames[..., :3], rotations, frozenset(bodies), solution.t,
+                   module.metadata.planar, mechanism.around.planes)
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Solids:
         """The shapes at other times: origins between those of the two nearest times, rotations on the shortest way."""
@@ -145,7 +154,8 @@ class Solids:
     def reach(self) -> np.ndarray:
         """Points that the picture must show, (n, 3)."""
         some = np.unique(np.linspace(0, len(self.origins) - 1, _SAMPLES).astype(int))
-        points = [np.concatenate(self.vertices(int(k))) for k in some] if self.parts else []
+        wide = [k for k, part in enumerate(self.parts) if not (part.ground and self.planar)]
+        points = [np.concatenate([there[i] for i in wide]) for k in some for there in [self.vertices(int(k))]] if wide else []
         if self.water is not None and self.water.reach is not None:
             high = self.water.waves[0] if self.water.waves is not None else 0.0
             points += [np.column_stack([self.water.reach, np.full(2, self.water.level + sign * high)]) for sign in (-1, 1)]
@@ -170,20 +180,6 @@ def part_way(A: np.ndarray, B: np.ndarray, w: Any) -> np.ndarray:
     K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
     turned = (w * angle)[..., None]
     return np.asarray(A @ (np.eye(3) + np.sin(turned) * K + (1 - np.cos(turned)) * K @ K))
-
-
-def lengths_of(solution: Solution) -> np.ndarray:
-    """The lengths in pictures that follow from the parameters of the run, in order."""
-    if "drawn_lengths" not in solution.module.functions:
-        return np.zeros(0)
-    return solution.module.evaluate("drawn_lengths", solution.t[0], solution.x[0], solution.params, solution.inputs[0]).ravel()
-
-
-def filled(records: Sequence[Mapping[str, Any]], lengths: np.ndarray) -> list[Mapping[str, Any]]:
-    """The records with lengths in place of None, in order."""
-    left = iter(lengths)
-    return [{**record, "values": {name: [[next(left) if e is None else e for e in row] for row in rows]
-                                  for name, rows in record["values"].items()}} for record in records]
 
 
 def water_of(record: Mapping[str, Any], name: str) -> Water:

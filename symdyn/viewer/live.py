@@ -17,9 +17,8 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
-from symdyn.pictures.grounds import Ground, gaps_of, grounds_of
-from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of
-from symdyn.pictures.mechanism import touched
+from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of, with_surroundings
+from symdyn.pictures.mechanism import filled, touched
 from symdyn.pictures.symbols import typeset_unit
 from symdyn.tape.floats import evaluate_rows
 from symdyn.viewer.page import View, page_of
@@ -32,8 +31,8 @@ if TYPE_CHECKING:
 
 # Configurations at which is looked where contacts are.
 _SAMPLES = 6
-# Of how far contacts get: gaps that differ by less belong to the same plane.
-_FLAT = 1e-9
+# How far beyond its start a mechanism may get by its sliders, of its length.
+_FURTHER = 1.0
 # What the page evaluates to place what is drawn, and to close loops.
 _POSES = ("frames", "positions", "joint_points", "joint_axes", "spring_points")
 _CLOSURE = ("C", "C_r", "N")
@@ -47,7 +46,7 @@ def show(system: System, path: Any = None, params: Numbers | None = None, q: Val
     closes = any(equations.holonomic)
     values, missing = _values(equations, params, q)
     numbers = _evaluate(equations, names, values)
-    mechanism = _mechanism(equations, numbers, values)
+    mechanism = _mechanism(equations, numbers, values, False)
     lengths = numbers.get("drawn_lengths", np.zeros(0)).ravel()
     bent = bent_bodies(equations.flexible, equations.bodies, lambda name: np.array([values[name]]))
     data = scene_of(mechanism, equations.drawn, lengths, bent, model.name)
@@ -62,7 +61,7 @@ def mechanism_of(model: Model) -> tuple[Mechanism, np.ndarray]:
     equations = augment(model) if model.loops or model.constraints else embed(model)
     values, _ = _values(equations, None, None)
     numbers = _evaluate(equations, [n for n in _POSES if n in equations.quantities], values)
-    return _mechanism(equations, numbers, values), numbers.get("drawn_lengths", np.zeros(0)).ravel()
+    return _mechanism(equations, numbers, values, True), numbers.get("drawn_lengths", np.zeros(0)).ravel()
 
 
 def _values(equations: Equations, params: Any, q: Any) -> tuple[dict[str, float], list[str]]:
@@ -104,7 +103,7 @@ def _evaluate(equations: Equations, names: Sequence[str], values: dict[str, floa
     return found
 
 
-def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dict[str, float]) -> Mechanism:
+def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dict[str, float], coarse: bool) -> Mechanism:
     n_b = len(equations.bodies)
     nothing = np.zeros((0, 6))
     drawn = drawn_otherwise(equations, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
@@ -117,17 +116,18 @@ def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dic
                      numbers.get("joint_axes", nothing).reshape(-1, 3), equations.connections,
                      springs, None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
                      drawn, ropes=ropes)
-    corners, wheels, grounds = _touching(equations, found, values)
-    if any(record["body"] == "ground" and record["kind"] != "line" for record in equations.drawn):
-        grounds = []  # it is drawn by the user
-    return replace(found, corners=corners, wheels=wheels, grounds=grounds)
+    corners, wheels = _touching(equations, found, values)
+    lengths = numbers.get("drawn_lengths", nothing).ravel()
+    around = list(filled([*equations.drawn, *equations.surroundings], lengths))[len(equations.drawn):]
+    found = replace(found, corners=corners, wheels=wheels)
+    return with_surroundings(found, around, equations.drawn, found.frames[None], _FURTHER, coarse)
 
 
 def _touching(equations: Equations, m: Mechanism, values: dict[str, float],
-              ) -> tuple[list[tuple[int, np.ndarray]], dict[int, float], list[Ground]]:
-    """Corners and rims, see `touched`, and planes of the ground: from some configurations, whether contacts are closed or not."""
+              ) -> tuple[list[tuple[int, np.ndarray]], dict[int, float]]:
+    """Corners and rims, see `touched`: from some configurations, whether contacts are closed or not."""
     if POINTS not in equations.quantities:
-        return [], {}, []
+        return [], {}
     rng = np.random.default_rng(0)
     rows: dict[str, Any] = dict(values)
     names = [c.name for c in equations.symbols.coordinates]
@@ -137,19 +137,12 @@ def _touching(equations: Equations, m: Mechanism, values: dict[str, float],
         norm = np.sqrt(sum(rows[names[k]] ** 2 for k in group))
         for k in group:
             rows[names[k]] = rows[names[k]] / norm
-    more = [name for name in ("contact_gaps", "compliant_contacts") if name in equations.quantities]
     with np.errstate(all="ignore"):
-        found = evaluate_rows(equations.tape("frames", POINTS, *more), rows, _SAMPLES)
+        found = evaluate_rows(equations.tape("frames", POINTS), rows, _SAMPLES)
     at = found[POINTS].reshape(_SAMPLES, -1, 2, 3)[:, :, 0]
     frames = found["frames"].reshape(_SAMPLES, len(m.bodies), 12)
     there = np.isfinite(frames).all(axis=(1, 2)) & np.isfinite(at).all(axis=(1, 2))
-    if there.sum() < 2:
-        return [], {}, []
-    nothing = np.zeros((_SAMPLES, 0))
-    rigid, compliant = (found[n].reshape(_SAMPLES, -1) if n in found else nothing for n in ("contact_gaps", "compliant_contacts"))
-    gaps = gaps_of(rigid, compliant, [bool(c.at) for c in equations.contacts], [len(c.expressions) for c in equations.compliant])
-    near = _FLAT * float(np.ptp(at[there].reshape(-1, 3), axis=0).max())
-    return *touched(m, frames[there], at[there]), grounds_of(at[there], gaps[there], near)
+    return touched(m, frames[there], at[there]) if there.sum() > 1 else ([], {})
 
 
 def _functions(equations: Equations, names: Sequence[str]) -> str:

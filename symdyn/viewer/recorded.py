@@ -8,11 +8,10 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
-from symdyn.pictures.arrows import TITLES, Arrows, arrows_of, floor_of, touching
+from symdyn.pictures.arrows import TITLES, Arrows, arrows_of
 from symdyn.pictures.bending import bendings
-from symdyn.pictures.mechanism import Hung, mechanism_of
+from symdyn.pictures.mechanism import Hung, lengths_of, mechanism_of
 from symdyn.pictures.panels import panels_of
-from symdyn.pictures.solids import lengths_of
 from symdyn.pictures.symbols import typeset_unit
 from symdyn.shown import shown
 from symdyn.viewer.arrays import packed
@@ -28,8 +27,6 @@ _SEEN, _TURN = 1.5e-3, 3e-3
 _LONGER = 0.02
 # Rows of a motion, and of its curves, at most.
 _MOST, _CURVES = 40_000, 2_000
-# Contacts at heights that differ by less touch a flat ground; of the mechanism's length.
-_FLAT = 1e-3
 
 
 def view(solution: Solution, path: Any = None, compare: Any = None, forces: bool = False) -> View:
@@ -75,9 +72,6 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     if eta:
         scene["eta"] = {"names": eta, "values": packed(np.column_stack([solution[c] for c in eta])[order][rows])}
     scene["arrows"] = [_arrows(one, order[rows]) for one in arrows]
-    at, _ = touching(solution)
-    level = floor_of(at, np.array(mechanism.up), _FLAT * scene["length"])
-    scene["grounds"] = [] if level is None else [[*mechanism.up, level]]
     return scene
 
 

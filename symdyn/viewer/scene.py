@@ -11,8 +11,9 @@ from matplotlib.colors import to_hex
 
 from symdyn.pictures.bending import Bending
 from symdyn.pictures.looks import PALETTE, Item, Mechanism, color_of_body, looks_of
+from symdyn.pictures.mechanism import filled
 from symdyn.pictures.meshes import Part, beam, parts_of
-from symdyn.pictures.solids import Water, color_of, filled, water_of
+from symdyn.pictures.solids import Water, color_of, water_of
 from symdyn.viewer.arrays import plain, text_of
 
 _GROUND_COLOR = "#9ca3af"
@@ -44,6 +45,12 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
             else:
                 threads += _threads(part, m, color, length)
     drawn = {mesh["body"] for mesh in meshes}
+    for part in m.around.parts:
+        color = to_hex(part.color)
+        if len(part.faces):
+            meshes.append({**_mesh(part, m, color, None, length), "ground": part.ground})
+        else:
+            threads += _threads(part, m, color, length)
     for body, bending in bent.items():
         if body not in drawn:
             part = beam(body, (0.0, 0.0, 0.0), bending.points, length)
@@ -52,7 +59,7 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
             "length": length, "up": list(m.up), "items": [*map(_plain, items), *threads],
             "meshes": meshes, "water": water, "palette": list(PALETTE), "joints": [list(j) for j in m.joints],
             "n_points": len(m.points),
-            "grounds": [[*map(_short, normal), _short(level)] for normal, level in m.grounds]}
+            "grounds": [[*map(_short, normal), _short(level)] for normal, level in m.around.planes]}
 
 
 def _plain(item: Item) -> dict[str, Any]:

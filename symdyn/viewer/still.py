@@ -12,9 +12,10 @@ from scipy.spatial import ConvexHull
 
 from symdyn.pictures.grounds import Ground
 from symdyn.pictures.looks import GROUND, PALETTE, Item, Mechanism, looks_of
-from symdyn.pictures.meshes import parts_of
+from symdyn.pictures.mechanism import filled
+from symdyn.pictures.meshes import Part, parts_of
 from symdyn.pictures.ropes import rope
-from symdyn.pictures.solids import color_of, filled
+from symdyn.pictures.solids import color_of
 
 _WIDE, _HIGH, _MARGIN = 260, 200, 12
 # The camera of the page: azimuth and elevation.
@@ -25,6 +26,8 @@ _AROUND = 3.0
 _LEAST = 3.0
 # Ground in the plane: its thickness, pixels; its colour.
 _THICK, _GROUND_COLOR = 8.0, "#d1d5db"
+# Cosine to the eye below which a face is seen from its edge.
+_EDGEWISE = 1e-6
 # What is left of a colour on faces that are turned away from the light.
 _SHADE = 0.62
 
@@ -40,10 +43,11 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     shapes = [shape for record in filled(records, lengths) if record["kind"] != "water"
               for shape in _of_record(m, record, axes, name)]
     shapes += [shape for item in items if not item.layer for shape in _of_item(m, item, axes)]
+    shapes += _around(m, axes)
     if not shapes:
         return ""
     # A rail that leaves the picture does not make the rest small.
-    room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind != "rail"]
+    room = [(points, 0.0 if kind == "wire" else wide) for _, points, wide, _, kind in shapes if kind not in ("rail", "ground")]
     seen = np.concatenate([end for points, wide in room or [(shapes[0][1], 0.0)] for end in (points - wide, points + wide)])
     low, high = seen.min(axis=0), seen.max(axis=0)
     # A block without a mechanism: its rail distinguishes it from a box. A ball alone is no particle where it fills the picture.
@@ -51,7 +55,7 @@ def picture_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.n
     span = np.maximum((high - low) * (_AROUND if alone else 1.0), 1e-9)
     scale = min((_WIDE - 2 * _MARGIN) / span[0], (_HIGH - 2 * _MARGIN) / span[1])
     middle = (low + high) / 2
-    drawn = "".join(_ground(m, plane, axes, scale, middle) for plane in m.grounds)
+    drawn = "".join(_ground(m, plane, axes, scale, middle) for plane in m.around.planes)
     drawn += "".join(_text(points, wide, color, kind, scale, middle) for _, points, wide, color, kind in
                      sorted(shapes, key=lambda shape: (shape[0], shape[-1] != "rail")))  # a rail goes through its block
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE} {_HIGH}" width="{_WIDE}" height="{_HIGH}" role="img" '
@@ -98,7 +102,7 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
         middle = (ends[0] + ends[1]) / 2
         yield from _hull(middle + _ring(axis, size[0], half), axes, _shaded(item.color, 0.0))
         yield from _hull(middle + half * axis + _ring(axis, size[0], 0.0), axes, item.color)
-    elif len(ends) == 2 and kind != "line":
+    elif len(ends) == 2 and kind not in ("line", "mooring"):
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
         if kind == "rope":
             ends = list(rope(ends[0], ends[1], size[1], np.array(m.up)))
@@ -119,15 +123,29 @@ def _of_record(m: Mechanism, record: Mapping[str, Any], axes: np.ndarray, name: 
         if to is not None:
             p, Q = _frame(m, m.index(to))
             placed[-1] = p + Q @ part.vertices[-1]
-        for face, corners in zip(part.faces, part.corners, strict=True):
-            a, b, c, _ = placed[corners]
-            normal = np.cross(b - a, c - a)
-            toward = float(normal @ axes[2]) / (float(np.linalg.norm(normal)) or 1.0)
-            if toward > 0:
-                points = placed[face]
-                yield float(points.mean(axis=0) @ axes[2]), points @ axes[:2].T, 0.0, _shaded(color, toward), "polygon"
-        if not part.faces:
-            yield float(placed.mean(axis=0) @ axes[2]), placed @ axes[:2].T, part.width, color, "wire"
+        yield from _of_part(part, placed, color, axes)
+
+
+def _around(m: Mechanism, axes: np.ndarray) -> Iterator[Shape]:
+    """What contacts touch: the ground behind all bodies."""
+    for part in m.around.parts:
+        o, R = _frame(m, part.body)
+        for depth, *shape, kind in _of_part(part, o + part.vertices @ R.T, str(to_hex(part.color)), axes):
+            yield (-np.inf, *shape, "ground") if part.ground else (depth, *shape, kind)
+
+
+def _of_part(part: Part, placed: np.ndarray, color: str, axes: np.ndarray) -> Iterator[Shape]:
+    """Its faces that are seen, or its line; placed: its vertices, n-frame."""
+    for face, corners in zip(part.faces, part.corners, strict=True):
+        a, b, c, d = placed[corners]
+        normal = np.cross(c - a, d - b)
+        toward = float(normal @ axes[2]) / (float(np.linalg.norm(normal)) or 1.0)
+        toward = abs(toward) if part.ground else toward
+        if toward > _EDGEWISE:
+            points = placed[face]
+            yield float(points.mean(axis=0) @ axes[2]), points @ axes[:2].T, 0.0, _shaded(color, toward), "polygon"
+    if not part.faces:
+        yield float(placed.mean(axis=0) @ axes[2]), placed @ axes[:2].T, part.width, color, "wire"
 
 
 def _frame(m: Mechanism, body: int) -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +207,7 @@ def _text(points: np.ndarray, wide: float, color: str, kind: str, scale: float, 
     if kind == "circle":
         return f'<circle cx="{places[0][0]:.1f}" cy="{places[0][1]:.1f}" r="{max(scale * wide, _LEAST):.1f}" fill="{color}"/>'
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-    if kind == "polygon":
+    if kind in ("polygon", "ground"):
         return f'<polygon points="{path}" fill="{color}" stroke="{color}" stroke-width="0.4"/>'
     width = wide if kind == "wire" else max(2 * scale * wide, 1.0)
     return (f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{width:.1f}" '

@@ -49,12 +49,12 @@ class Stage {
     reach(scene) {
         const found = [];
         const { source } = scene;
-        for (const item of scene.items) if (!item.layer && item.kind !== "line" && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
+        for (const item of scene.items) if (!item.layer && !["line", "mooring"].includes(item.kind) && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
             for (const end of item.ends) {
                 const p = source.at(end), r = Math.max(...item.size) * (item.ends.length > 1 ? 0.6 : 1);
                 for (const e of [[r, r, r], [-r, -r, -r], [r, -r, r], [-r, r, -r]]) found.push(add(p, e));
             }
-        for (const mesh of scene.meshes) for (let k = 0; k < mesh.own.length; k += 6)
+        for (const mesh of scene.meshes) if (!(mesh.ground && this.planar)) for (let k = 0; k < mesh.own.length; k += 6)
             found.push(source.world(mesh.body, mesh.own[k], mesh.own[k + 1], mesh.own[k + 2]));
         for (let k = 0; k < source.bodies; k++) found.push(source.world(k, 0, 0, 0));
         return found;
@@ -266,8 +266,9 @@ class Stage {
             this.rod(scene, add(a, down, s[1]), a, [s[0], 0.25 * s[0]], color, name);
         } else {
             const b = source.at(item.ends[1]);
-            if (kind === "rope") {
-                const r = Math.max(s[0], 0.0012 * size(minus(this.eye[0], a))), points = ropeOf(a, b, s[1], this.up);
+            if (kind === "rope" || kind === "mooring") {
+                const r = Math.max(s[0], 0.0012 * size(minus(this.eye[0], a)));
+                const points = kind === "rope" ? ropeOf(a, b, s[1], this.up) : mooringOf(a, b, ...s.slice(2));
                 for (let k = 1; k < points.length; k++) this.rod(scene, points[k - 1], points[k], [r, r], color, name);
             } else if (kind === "rod") this.rod(scene, a, b, s, color, name);
             else if (kind === "thread" || kind === "line") {
@@ -289,6 +290,7 @@ class Stage {
         if (mesh.bend) this.bend(mesh, source);
         const o = source.world(k, 0, 0, 0), [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(e => source.world(k, ...e, true));
         this.renderer.draw(mesh.made, placed(x, y, z, o, [1, 1, 1]), [1, 1, 1], mesh.color, 1, 1);
+        if (mesh.ground) return;
         let far = 0;
         for (let v = 0; v < mesh.own.length; v += 6) {
             const d = Math.abs(mesh.own[v] - mesh.own[0]) + Math.abs(mesh.own[v + 1] - mesh.own[1]) + Math.abs(mesh.own[v + 2] - mesh.own[2]);

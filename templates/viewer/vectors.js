@@ -63,3 +63,54 @@ function ropeOf(a, b, length, up) {
         return at(x / h, c * (Math.cosh((x - lowest) / c) - Math.cosh(lowest / c)));
     });
 }
+
+// The horizontal and the vertical force at the fairlead of a mooring line, over its weight; null where none is found. The algorithm is
+// that of symdyn/tape/algorithms/catenary.py: lengths are over that of the line, e its weight over EA.
+function lineForce(x, z, e, friction, seabed) {
+    if (seabed && !(z > 0)) return null;
+    const hanging = 2 * z / (1 + Math.sqrt(1 + 2 * e * z));
+    if (seabed && hanging <= 1 && x <= 1 - hanging + 9e-16) return [0, hanging];
+    if (!(x > 1e-9)) return null;
+    const d = Math.hypot(x, z), flat = d < 1 ? Math.sqrt(3 * (1 - d * d)) / x : 0.2, f = (1 - x) / z;
+    let h = x / 2 / flat, v = (z / Math.tanh(flat) + 1) / 2;
+    if (d > 1 && e > 0 && (d - 1) * x > e * h * d) [h, v] = [(d - 1) * x / (e * d), (d - 1) * z / (e * d) + 0.5];
+    if (seabed && f > 0 && f < 1) {
+        const touching = z * (1 - f) / (f * f * (4.5 - f * (4.2 - 3.6 * f))), lifted = Math.sqrt(z * (z + 2 * touching));
+        if (lifted < 1) [h, v] = [touching, lifted];
+    }
+    for (let round = 0; round < 100; round++) {
+        const rests = seabed && v < 1, s = rests ? 1 - v : 0, b = rests ? 0 : v - 1, l = 1 - s;
+        const t = Math.hypot(h, v), a = Math.hypot(h, b), tense = friction * s > h ? h / friction : s;
+        const top = v > 0 ? t + v : h * h / (t - v), foot = b < 0 ? h * h / (a - b) : a + b;
+        const arc = Math.log1p(2 * l * top / (h * h + foot * top)), slope = v / t - b / a;
+        const xOff = s + h * arc + e * (h * (l + tense) - friction / 2 * tense * tense) - x, zOff = l * (v + b) * (1 / (t + a) + e / 2) - z;
+        const zh = h * (1 / t - 1 / a), xh = arc - slope + e * (l + tense), xv = zh + (rests ? e * friction * tense : 0), zv = slope + e * l;
+        const determinant = xh * zv - xv * zh;
+        if (!(determinant > 0)) return null;
+        const dh = (xv * zOff - zv * xOff) / determinant, dv = (zh * xOff - xh * zOff) / determinant;
+        let step = h + dh >= 0.1 * h ? 1 : -0.9 * h / dh;
+        if (seabed && v + step * dv < 0.1 * v) step = -0.9 * v / dv;
+        h += step * dh;
+        v += step * dv;
+        if (Math.abs(dh) <= 1e-8 * h && Math.abs(dv) <= 1e-8 * (h + Math.abs(v))) return [h, v];
+    }
+    return null;
+}
+
+// Points along a mooring line from its fairlead to its anchor, evenly by its unstretched length: `mooring` of symdyn/pictures/ropes.py.
+function mooringOf(fairlead, anchor, length, e, friction, seabed) {
+    const way = minus(fairlead, anchor), far = Math.hypot(way[0], way[1]), count = 24;
+    const x = Math.hypot(far, 2e-9 * length) / length, found = lineForce(x, way[2] / length, e, friction, seabed);
+    if (!found) return [fairlead, anchor];
+    const [h, v] = found, lies = seabed ? Math.max(1 - v, 0) : 0, b = seabed ? Math.max(v - 1, 0) : v - 1;
+    const tense = friction ? Math.min(lies, h / friction) : lies;
+    const stretch = u => h * Math.min(u, tense) - friction / 2 * Math.min(u, tense) ** 2;
+    return Array.from({ length: count + 1 }, (_, k) => {
+        const s = 1 - k / count, on = Math.min(s, lies), up = Math.max(s - lies, 0), force = b + up;
+        let along = on + e * (stretch(lies) - stretch(lies - on));
+        if (h > 0) along += h * (Math.asinh(force / h) - Math.asinh(b / h)) + e * h * up;
+        else if (lies) along = on * x / lies;
+        const height = Math.hypot(h, force) - Math.hypot(h, b) + e * up * (b + up / 2), share = length * along / (far || 1);
+        return [anchor[0] + share * way[0], anchor[1] + share * way[1], anchor[2] + length * height];
+    });
+}

@@ -69,7 +69,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                       model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model),
                       {b.mass: b.name for b in reversed(model.bodies) if b.mass in parameters}, _point_units(model))
     recorded = quantities.quantities()
-    lengths = [e for shape in model.shapes for e in shape.expressions]
+    lengths = [e for shape in (*model.shapes, *model.surroundings) for e in shape.expressions]
     if lengths:
         recorded["drawn_lengths"] = partial(algebra.constants, lengths)
     return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, recorded,
@@ -82,6 +82,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   contacts=model.contacts, compliant=model.compliant, contact_groups=model.groups,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
+                  surroundings=tuple(shape.record for shape in model.surroundings),
                   connections=_connections(quantities),
                   acting=tuple(one.record for one in quantities.acting), down=_down(model),
                   flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),

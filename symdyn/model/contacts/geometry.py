@@ -230,7 +230,7 @@ class Geometry:
             return None
         if self._spline is not None:
             return self._spline.at(*symbols)
-        if isinstance(graph, Curve) and _is_spline(graph.height):
+        if isinstance(graph, Curve) and is_spline(graph.height):
             return _polynomials(graph.height, symbols[0])
         return self._written(graph.height, dict(zip(given, symbols, strict=True)), "height")
 
@@ -479,11 +479,11 @@ def _spline_of(label: str, other: Any) -> Spline | None:
     if isinstance(other, Surface):
         return grid_spline_of(label, other.height)
     value: Any = other.height if isinstance(other, Curve) else other.radius if isinstance(other, Cam) else None
-    long = _is_spline(value) and (isinstance(other, Cam) or len(value.x) > WRITTEN_OUT + 1)
+    long = is_spline(value) and (isinstance(other, Cam) or len(value.x) > WRITTEN_OUT + 1)
     return line_spline_of(label, value) if long else None
 
 
-def _is_spline(value: Any) -> bool:
+def is_spline(value: Any) -> bool:
     """Whether it has breaks x and coefficients c of polynomials between them, as splines of SciPy."""
     x, c = getattr(value, "x", None), getattr(value, "c", None)
     return (isinstance(x, np.ndarray) and isinstance(c, np.ndarray) and x.ndim == 1 and c.ndim == 2
