@@ -96,10 +96,11 @@ class Drawing:
         return len(self.labels) == 3
 
     @classmethod
-    def of(cls, solution: Solution, forces: bool = False) -> Drawing | None:
+    def of(cls, solution: Solution, forces: bool = False, span: tuple[float, float] | None = None) -> Drawing | None:
         """What can be drawn of a motion; None if the module gives no positions, or nothing moves.
 
         forces   with arrows of forces in joints, loads and weights; those of contacts are always there
+        span     the part of the motion that is shown, s: rails and what has no size of its own are as long as it needs; None: all
         """
         if "positions" not in solution.module.functions:
             return None
@@ -107,7 +108,7 @@ class Drawing:
         centres = solution.rows("positions").reshape(n_t, -1, 3)
         if not centres.shape[1] or not np.isfinite(centres).all():
             return None
-        solids = Solids.of(solution)
+        solids = Solids.of(solution, span)
         if solids is not None and solids.forms is not None:
             made = carriers(about.bodies, about.reactions, about.reaction_bodies)
             centres = np.delete(centres, sorted(made), axis=1)

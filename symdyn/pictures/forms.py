@@ -18,7 +18,7 @@ _BANDS = 8
 # How far from its poles a ball is cut off, rad.
 _POLE = 0.06
 # Corners around rods, and around what is as wide as it likes: wheels and bodies without a joint.
-_ROD, _WHEEL = 16, 40
+_ROD, _WHEEL = 16, 48
 _TURNS, _PER_TURN = 9, 12
 # Width of the wire of a coil and of a force's line, in points of print.
 _WIRE, _THREAD = 1.4, 1.2

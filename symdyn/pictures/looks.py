@@ -29,6 +29,8 @@ _LINE = 0.4
 _RADIUS = 0.02
 # Length of a mechanism whose bodies have no extent, of how far they get.
 _WAY = 0.15
+# How much larger a block is that is all there is.
+_ALONE = 1.8
 # Half the length of a rail on which nothing has moved, of the mechanism's length.
 _RAIL = 0.5
 
@@ -281,12 +283,14 @@ def _joints(m: Mechanism, r: float, length: float, carriers: frozenset[int]) -> 
         own = replace(Item(kind, (2 * j + 1,), (r, r), DARK, title), axis=j, body=ends[1])
         if kind == "rod":
             yield Item("rod", (2 * j, 2 * j + 1), (0.6 * r, 0.6 * r), METAL, title)
+            yield from _held(m, (2 * j, 2 * j + 1), r, title)
             continue
         if kind in _SLIDING:
             # The block is on what moves along the rail: on the child, or on the parent where the child is the ground.
             flipped = ends[1] == GROUND
             moving, held = (2 * j, 2 * j + 1) if flipped else (2 * j + 1, 2 * j)
-            yield replace(own, kind="block", ends=(moving,), size=(2.2 * r, 2.2 * r, 3.2 * r), body=ends[not flipped],
+            b = r if len(m.bodies) > 1 else _ALONE * r
+            yield replace(own, kind="block", ends=(moving,), size=(2.2 * b, 2.2 * b, 3.2 * b), body=ends[not flipped],
                           color=color_of_body(ends[not flipped]))
             least, most = m.travels[j] if m.travels else (-_RAIL * length, _RAIL * length)
             least, most = (-most, -least) if flipped else (least, most)
@@ -299,10 +303,22 @@ def _joints(m: Mechanism, r: float, length: float, carriers: frozenset[int]) -> 
             yield Item("stand", (2 * j + int(ends[1] == GROUND),), (3.2 * r, 4.5 * r), METAL, f"{title}, on the ground")
 
 
+def _held(m: Mechanism, ends: tuple[int, int], r: float, name: str) -> Iterator[Item]:
+    """Stands, or hangers, where the ground holds an end and no joint is."""
+    owners, points = m.owners(), m.points
+    joined = [points[k] for k in range(2 * len(m.joints)) if m.joints[k // 2][3] not in (*_FLOATING, "rod")]
+    for end, other in (ends, ends[::-1]):
+        if owners[end] == GROUND and not any(np.linalg.norm(points[end] - one) < r for one in joined):
+            above = float((points[other] - points[end]) @ np.array(m.up)) >= 0
+            yield Item("stand", (end,), (2.2 * r, 3.2 * r if above else -3.2 * r), METAL, f"{name}, on the ground")
+
+
 def _springs(m: Mechanism, r: float, length: float) -> Iterator[Item]:
     first = 2 * len(m.joints) + 2 * len(m.bodies)
     for k, (name, _, _, kind) in enumerate(m.connections):
         ends = (first + 2 * k, first + 2 * k + 1)
+        if kind not in ("line", "force"):
+            yield from _held(m, ends, r, name)
         if kind == "rope":
             yield Item("rope", ends, (0.3 * r, m.ropes.get(name, 0.0)), STEEL, name)
             continue

@@ -63,10 +63,11 @@ class Posed:
         return point_of(ref, self.points, self.axes, lambda body, place: self.origins[body] + self.rotations[body] @ place)
 
 
-def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanism:
+def mechanism_of(solution: Solution, frames: np.ndarray, first: int, span: tuple[float, float] | None = None) -> Mechanism:
     """The mechanism at the start of a motion.
 
     frames   of the bodies at every time, (n_t, n_b, 12), n-frame; first: the row of the solution that is its start
+    span     the part of the motion that is shown, s: so far rails reach; None: all
     """
     module, about = solution.module, solution.module.metadata
 
@@ -95,6 +96,9 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int) -> Mechanis
     corners, wheels = _touching(solution, found, frames)
     gaps = at("contact_gaps", 1).ravel()[:4 * len(about.contacts):4].tolist()
     ropes = ropes_of([c.name for c in about.contacts], found.connections, gaps, springs) if len(gaps) else {}
+    if span is not None:
+        within = (solution.t >= span[0]) & (solution.t <= span[1])
+        frames = frames[within] if within.sum() > 1 else frames
     way = float(np.linalg.norm(np.ptp(frames[..., :3], axis=(0, 1))))
     found = replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels, way=way)
     around = list(filled([*about.drawn, *about.surroundings], lengths_of(solution)))[len(about.drawn):]

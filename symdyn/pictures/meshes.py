@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 Color = tuple[float, float, float]
-# Corners of a round section, and of a flat one.
-_ROUND, _FLAT = 20, 10
+# Corners of a round section, of a wheel, and of a flat section.
+_ROUND, _WHEEL, _FLAT = 20, 48, 10
 # Stations of a shape that bends.
 _BENDING = 13
 # Width of a beam without a shape, of the mechanism's length.
@@ -55,7 +55,9 @@ def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None 
         points, widths = values["points"], values["widths"]
         if bends:
             points, widths = _finer(points), _finer(widths, points)
-        yield sweep(body, color, points, widths, values["direction"][0] if "direction" in values else None)
+        flat = len(points) == 2 and float(widths.max()) > float(np.linalg.norm(points[1] - points[0]))
+        yield sweep(body, color, points, widths, values["direction"][0] if "direction" in values else None,
+                    _WHEEL if flat else _ROUND)
     elif record["kind"] == "mesh":
         yield _triangles(body, color, np.array(record["vertices"]), np.array(record["faces"], dtype=int))
     elif record["kind"] == "line":

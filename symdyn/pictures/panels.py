@@ -21,6 +21,8 @@ MOST = len(LINES)
 GROUPS = ("coordinates", "speeds", "states", "inputs", "outputs", "energy")
 # How far coordinates are moved to see which joint they belong to, and what counts as moved.
 _STEP, _MOVED = 1e-4, 1e-9
+# The unit of outputs that are accelerations of points.
+_ACCELERATION = "m/s^2"
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def _outputs(solution: Solution) -> Iterator[Panel]:
             unit = solution.module.metadata.output_units.get(name, "")
             labels = [name] if flat.shape[1] == 1 else [f"{name} {'xyz'[k]}" if unit else f"{name}[{k}]"
                                                         for k in range(flat.shape[1])]
-            yield Panel("output", unit, labels, flat, keys, "outputs")
+            yield Panel("acceleration" if unit == _ACCELERATION else "output", unit, labels, flat, keys, "outputs")
 
 
 def _energy(solution: Solution) -> Iterator[Panel]:

@@ -85,8 +85,11 @@ class Solids:
         return [*self.own, *(form.part for form in (self.forms.forms if self.forms is not None else ()))]
 
     @classmethod
-    def of(cls, solution: Solution) -> Solids | None:
-        """The shapes of a motion; None if its module has none. Raises ArgumentError for a colour that does not exist."""
+    def of(cls, solution: Solution, span: tuple[float, float] | None = None) -> Solids | None:
+        """The shapes of a motion; None if its module has none. Raises ArgumentError for a colour that does not exist.
+
+        span   the part of it that is shown, s; None: all
+        """
         module = solution.module
         records = module.metadata.drawn
         bent = bendings(solution)
@@ -96,7 +99,7 @@ class Solids:
         frames = solution.rows("frames").reshape(len(solution.t), -1, 12)
         if not np.isfinite(frames).all():
             return None
-        mechanism = mechanism_of(solution, frames, int(solution.t.argmin()))
+        mechanism = mechanism_of(solution, frames, int(solution.t.argmin()), span)
         forms = Forms.of(mechanism) if jointed else None
         length = forms.length if forms is not None else float(np.ptp(frames[..., :3], axis=(0, 1)).max(initial=0.0))
         still = np.concatenate([np.zeros(3), np.eye(3).ravel()])

@@ -34,11 +34,12 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
     drawn.
     """
     flag(forces, f"{solution.module.name}: forces")
-    drawing = Drawing.of(solution, forces) if len(solution.t) else None
+    times, views = _pictures(solution, t, view) if len(solution.t) else (np.zeros(0), [])
+    span = (float(times.min()), float(times.max())) if len(times) > 1 else None
+    drawing = Drawing.of(solution, forces, span) if len(times) else None
     if drawing is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to draw: the function 'positions' is needed, and bodies "
                             "that extend or move")
-    times, views = _pictures(solution, t, view)
     there = drawing.at(solution.t, times) if len(solution.t) > 1 else drawing
     spans = np.ptp(there.limits(), axis=1)
     columns = min(len(times), _COLUMNS)

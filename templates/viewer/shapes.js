@@ -20,15 +20,19 @@ function joined(...meshes) {
 }
 
 const TURN = 2 * Math.PI;
-const disc = (z, n) => surface(1, 24, (u, v) => [u * Math.cos(v * TURN), u * Math.sin(v * TURN), z, 0, 0, n]);
+const disc = (z, n, corners) => surface(1, corners, (u, v) => [u * Math.cos(v * TURN), u * Math.sin(v * TURN), z, 0, 0, n]);
+const round = corners => joined(surface(1, corners, (u, v) => [Math.cos(v * TURN), Math.sin(v * TURN), u, Math.cos(v * TURN), Math.sin(v * TURN), 0]),
+    disc(0, -1, corners), disc(1, 1, corners));
+const ball = (rows, columns) => surface(rows, columns, (u, v) => {
+    const s = Math.sin(u * Math.PI), p = [s * Math.cos(v * TURN), s * Math.sin(v * TURN), Math.cos(u * Math.PI)];
+    return [...p, ...p];
+});
 const MESHES = {
     // From z = 0 to 1 with radius 1.
-    rod: joined(surface(1, 24, (u, v) => [Math.cos(v * TURN), Math.sin(v * TURN), u, Math.cos(v * TURN), Math.sin(v * TURN), 0]),
-        disc(0, -1), disc(1, 1)),
-    ball: surface(14, 22, (u, v) => {
-        const s = Math.sin(u * Math.PI), p = [s * Math.cos(v * TURN), s * Math.sin(v * TURN), Math.cos(u * Math.PI)];
-        return [...p, ...p];
-    }),
+    rod: round(24),
+    wheel: round(64),
+    ball: ball(14, 22),
+    globe: ball(28, 56),
     // From -1 to 1 along each axis.
     box: joined(...[0, 1, 2].flatMap(k => [-1, 1].map(s => surface(1, 1, (u, v) => {
         const p = [0, 0, 0], n = [0, 0, 0];

@@ -234,7 +234,8 @@ class Stage {
         const way = minus(b, a), long = size(way);
         if (!(long > 1e-9 * this.length)) return;
         const z = times(way, 1 / long), [x, y] = across(z), stretch = [radii[0], radii[0], long];
-        this.renderer.draw(this.library[mesh], placed(x, y, z, a, stretch), stretch, color, mesh === "rod" ? radii[1] / radii[0] : 1, flat);
+        const solid = mesh === "rod" && radii[0] > long ? "wheel" : mesh;
+        this.renderer.draw(this.library[solid], placed(x, y, z, a, stretch), stretch, color, mesh === "rod" ? radii[1] / radii[0] : 1, flat);
         if (name) scene.picks.push({ a, b, radius: Math.max(...radii), name });
     }
 
@@ -251,7 +252,7 @@ class Stage {
             scene.picks.push({ a, b: a, radius: Math.max(...stretch), name });
         };
         const X = [1, 0, 0], Y = [0, 1, 0], Z = [0, 0, 1];
-        if (kind === "ball") solid("ball", X, Y, Z, [s[0], s[0], s[0]]);
+        if (kind === "ball") solid(s[0] > 0.1 * this.length ? "globe" : "ball", X, Y, Z, [s[0], s[0], s[0]]);
         else if (kind === "pin" || kind === "disc") {
             const n = source.axis(item.axis);
             this.rod(scene, add(a, n, -s[1]), add(a, n, s[1]), [s[0], s[0]], color, name);

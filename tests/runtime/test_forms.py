@@ -20,6 +20,7 @@ from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
 from symdyn.pictures.forms import Form
 from symdyn.pictures.looks import STEEL
+from symdyn.pictures.meshes import parts_of
 from symdyn.pictures.scene import Scene
 from symdyn.pictures.solids import Solids
 
@@ -118,9 +119,10 @@ def test_mooring_lines_go_from_the_fairlead_towards_the_anchor() -> None:
     assert solution.module.metadata.connections == (("line", "box", "ground", "line"),)
     ends = solution.rows("spring_points").reshape(len(solution.t), 2, 3)
     assert np.allclose(ends[:, 0], fairlead + np.array([0, 0, 1]) * solution.q) and np.allclose(ends[:, 1], anchor)
-    (line,) = [places for form, places in placed(solution, -1) if form.item.kind == "line"]
-    way = line[1] - line[0]
-    assert np.allclose(line[0], ends[-1, 0]) and np.allclose(np.cross(way, anchor - ends[-1, 0]), 0, atol=1e-9)
+    (line,) = [places for form, places in placed(solution, -1) if form.item.kind == "mooring"]
+    ways, aside = line[1:] - line[0], np.cross(anchor - ends[-1, 0], [0, 0, 1])
+    assert np.allclose(line[0], ends[-1, 0]) and np.allclose(ways @ aside, 0, atol=1e-9)
+    assert (ways @ (anchor - ends[-1, 0]) > 0).all()
     drawing = Drawing.of(solution)
     assert drawing is not None and np.ptp(drawing.limits(), axis=1).max() < 5
 
@@ -185,3 +187,39 @@ def test_modules_without_some_functions_are_drawn(left_out: str) -> None:
         patch.setattr(solution.module, "metadata", fewer)
         assert left_out not in solution.module.functions
         assert len(solution.picture(0.0).axes) == 1 and len(solution.view().html) > 10_000
+
+
+def test_the_ground_holds_springs_and_rods_by_stands_and_hangers() -> None:
+    """A stand where the spring is above, a hanger where it is below; none where a joint already has one."""
+    system = sd.System("held", gravity=[0, -9.81])
+    x, y = sd.coordinates("x y")
+    body = system.add_body("body", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, body, [x, y, 0]))
+    system.add_spring_damper(body, system.ground, stiffness=10, length=1, point_b=[0, -1], name="below")
+    system.add_spring_damper(body, system.ground, stiffness=10, length=1, point_b=[0, 1], name="above")
+    lever = system.add_body("lever", mass=1.0, inertia=0.1, com=[0.5, 0])
+    system.add_joint(sd.Revolute("pin", system.ground, lever, coordinate=sd.coordinates("phi"), parent_point=[2, 0]))
+    system.add_spring_damper(body, system.ground, stiffness=10, length=1, point_b=[2, 0], name="to the pin")
+    found = placed(system.compile(backend="numpy").simulate((0, 0.01)), 0)
+    cones = {form.item.name: places for form, places in found if form.item.kind == "stand"}
+    assert set(cones) == {"pin (revolute), on the ground", "below, on the ground", "above, on the ground"}
+    assert cones["below, on the ground"][:, 1].max() == pytest.approx(-1)
+    assert cones["above, on the ground"][:, 1].min() == pytest.approx(1)
+
+
+def test_rails_in_stills_reach_through_the_times_that_are_shown() -> None:
+    """A body that goes far after these does not make the picture long."""
+    system = sd.System("slide", gravity=[0, -9.81])
+    body = system.add_body("body", mass=1.0)
+    system.add_joint(sd.Prismatic("rail", system.ground, body, axis=[1, 0], coordinate=sd.coordinates("x")))
+    solution = system.compile(backend="numpy").simulate(np.linspace(0, 100, 1001), u=[1.0])
+    left, right = solution.picture([0, 1]).axes[0].get_xlim()
+    assert left < 0 < 1 < right < 2
+    assert solution.picture([0, 100]).axes[0].get_xlim()[1] > 100
+
+
+def test_discs_of_the_user_are_round() -> None:
+    records = [{"kind": "sweep", "values": {"points": [[0, 0, 0], [0, 0, long]], "widths": [[1, 1], [1, 1]]}}
+               for long in (0.1, 3.0)]
+    wheel, rod = (part for record in records for part in parts_of(record, 0, (0.0, 0.0, 0.0)))
+    assert (len(wheel.vertices), len(rod.vertices)) == (2 * 48, 2 * 20)

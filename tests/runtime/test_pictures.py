@@ -165,7 +165,7 @@ def test_on_paper_long_names_leave_the_curves_their_width() -> None:
     figure = motion("floating_wind_turbine").plot(style="paper")
     figure.canvas.draw()
     renderer, wide = figure.canvas.get_renderer(), figure.bbox.width
-    assert {"output [m/s²]", "energy [J]"} <= set(labels(figure))
+    assert {"acceleration [m/s²]", "energy [J]"} <= set(labels(figure))
     for axes in figure.axes:
         assert axes.get_window_extent().width > 0.7 * wide, axes.get_ylabel()
         legend, power = axes.get_legend(), axes.yaxis.get_offset_text()
