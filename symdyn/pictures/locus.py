@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _SCALE = "cividis"
 _RATIOS = (0.1, 0.3, 0.5, 0.7, 0.9)
+# Numbers that are nearer to each other overlap, pixels.
+_APART = 18.0
 # Up to so many values each is marked.
 _MARKED = 60
 
@@ -63,11 +65,16 @@ def plot(locus: RootLocus, path: Any = None, damping: bool = True) -> Figure:
 def _rays(axes: Any) -> None:
     """Where the damping ratio is the same, with its number at the edge of the picture."""
     left, (_, top) = -axes.get_xlim()[0], axes.get_ylim()
+    named: list[np.ndarray] = []
     for ratio in _RATIOS:
         slope = np.sqrt(1 - ratio**2) / ratio
         reach = min(left, top / slope)
         for sign in (1, -1):
             axes.plot([0, -reach], [0, sign * slope * reach], color="0.8", linewidth=0.7, linestyle=(0, (4, 4)), zorder=0,
                       scalex=False, scaley=False)
+        place = axes.transData.transform((-reach, slope * reach))
+        if any(np.abs(place - other).max() < _APART for other in named):
+            continue  # steep lines are close to each other where real parts are large
+        named.append(place)
         axes.annotate(f"{ratio:g}", (-reach, slope * reach), xytext=(2, -2), textcoords="offset points", color="0.5", fontsize=7,
                       va="top")

@@ -46,6 +46,37 @@ def test_the_response_is_that_of_an_oscillator(stage: Module, tmp_path: Path) ->
     assert (tmp_path / "bode.pdf").stat().st_size > 5000
 
 
+def test_many_outputs_differ_by_colours_and_dashes_and_inputs_without_effect_are_named(tmp_path: Path) -> None:
+    """Units stand with what they are of: an output by several inputs has one unit of its own."""
+    x, y, F, G = *sd.coordinates("x y"), *sd.inputs("F G")
+    k = sd.parameters("k")
+    system = sd.System("two", gravity=[0, 0])
+    for name, q, force in (("one", x, F), ("other", y, 0 * G)):
+        body = system.add_body(name, mass=1.0)
+        system.add_joint(sd.Prismatic(f"rail_{name}", system.ground, body, axis=[1, 0], coordinate=q))
+        system.add_joint_force(f"rail_{name}", force - k * q)
+    system.add_force("one", [0, G])
+    for n in range(10):
+        system.add_output(f"o{n}", (n + 1) * x)
+    system.defaults = {k: 1.0}
+    system.units = {F: "N", G: "N"}
+    module = system.compile(backend="numpy")
+    figure = module.linearize(module.equilibrium()).response([0.1, 0.5]).plot(tmp_path / "bode.png")
+    first, second = figure.axes[:2]
+    drawn = {(line.get_color(), line.get_linestyle()) for line in first.lines}
+    assert len(drawn) == len(first.lines) == 10
+    assert [axes.get_title() for axes in (first, second)] == ["input $F$ [N]", "input $G$ [N]"]
+    assert [text.get_text() for text in second.texts] == ["no effect on these outputs"] and not first.texts
+
+
+def test_numbers_of_damping_do_not_overlap(stage: Module) -> None:
+    """In a picture whose real parts are much larger than its imaginary ones."""
+    figure = stage.root_locus("c", np.linspace(100, 1000, 10)).plot()
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    assert boxes and not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+
+
 def test_by_default_the_response_covers_all_eigenvalues(stage: Module) -> None:
     response = stage.linearize(stage.equilibrium(params={"c": 0.0})).response()
     natural = np.sqrt(K / M)
