@@ -21,8 +21,8 @@ function joined(...meshes) {
 
 const TURN = 2 * Math.PI;
 const disc = (z, n, corners) => surface(1, corners, (u, v) => [u * Math.cos(v * TURN), u * Math.sin(v * TURN), z, 0, 0, n]);
-const round = corners => joined(surface(1, corners, (u, v) => [Math.cos(v * TURN), Math.sin(v * TURN), u, Math.cos(v * TURN), Math.sin(v * TURN), 0]),
-    disc(0, -1, corners), disc(1, 1, corners));
+const tube = corners => surface(1, corners, (u, v) => [Math.cos(v * TURN), Math.sin(v * TURN), u, Math.cos(v * TURN), Math.sin(v * TURN), 0]);
+const round = corners => joined(tube(corners), disc(0, -1, corners), disc(1, 1, corners));
 const ball = (rows, columns) => surface(rows, columns, (u, v) => {
     const s = Math.sin(u * Math.PI), p = [s * Math.cos(v * TURN), s * Math.sin(v * TURN), Math.cos(u * Math.PI)];
     return [...p, ...p];
@@ -31,6 +31,8 @@ const MESHES = {
     // From z = 0 to 1 with radius 1.
     rod: round(24),
     wheel: round(64),
+    // What is too thin for its ends to be seen.
+    thread: tube(6),
     ball: ball(14, 22),
     globe: ball(28, 56),
     // From -1 to 1 along each axis.

@@ -270,11 +270,11 @@ class Stage {
             if (kind === "rope" || kind === "mooring") {
                 const r = Math.max(s[0], 0.0012 * size(minus(this.eye[0], a)));
                 const points = kind === "rope" ? ropeOf(a, b, s[1], this.up) : mooringOf(a, b, ...s.slice(2));
-                for (let k = 1; k < points.length; k++) this.rod(scene, points[k - 1], points[k], [r, r], color, name);
+                for (let k = 1; k < points.length; k++) this.rod(scene, points[k - 1], points[k], [r, r], color, name, "thread");
             } else if (kind === "rod") this.rod(scene, a, b, s, color, name);
             else if (kind === "thread" || kind === "line") {
                 const [eye] = this.eye, r = Math.max(s[0], 0.0012 * size(minus(eye, a)));
-                this.rod(scene, a, b, [r, r], color, name);
+                this.rod(scene, a, b, [r, r], color, name, "thread");
             } else {
                 if (kind !== "damper") this.rod(scene, a, b, [s[0], s[0]], color, name, "spring");
                 if (kind !== "spring") {
