@@ -59,7 +59,7 @@ def test_a_rope_sags_until_it_is_taut(tmp_path: Path) -> None:
     (connection,) = solution.module.metadata.connections
     assert connection == ("rope 'tether'", "ball", "ground", "rope")
     solution.view(tmp_path / "view.html")
-    lowest = """() => { symdyn.stage.draw(false); const own = symdyn.scenes[0].picks.filter(p => p.name.startsWith("rope"));
+    lowest = """() => { symdyn.stage.draw(false); const own = symdyn.scenes[0].picks.filter(p => p.name === "rope 'tether'");
         return [own.length, Math.min(...own.map(p => Math.min(p.a[2], p.b[2]))), own.map(p => [...p.a, ...p.b])]; }"""
     with browser() as opened, Opened(opened, tmp_path / "view.html") as page:
         pieces, low, ways = page.page.evaluate(lowest)
