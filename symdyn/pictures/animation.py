@@ -28,7 +28,7 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
             view: Any = None, forces: bool = False) -> FuncAnimation:
     """The moving bodies, with the way of the last centre of mass.
 
-    forces  with arrows of forces in joints, loads and weights, and torques of loads
+    forces  with arrows of forces in joints, loads and weights, and torques in joints and of loads
     fps     pictures a second; speed: seconds of motion in one second of film
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
     path    where to save the film: a .gif, which needs Pillow and nothing else, or an .mp4 by the program ffmpeg

@@ -26,9 +26,10 @@ _CORNERS, _AROUND, _RADIUS = 25, 1.5 * np.pi, 0.5
 # What is this much smaller than the largest force, or torque, is rounding.
 _ROUNDING = 1e-9
 # What the layers are called, and their colours: readers with any kind of colour vision can tell them apart.
-TITLES = {"forces": "forces in joints", "loads": "forces of loads", "torques": "torques of loads", "weights": "weights",
-          "contacts": "forces of contacts"}
-COLORS = {"forces": "#7C2D12", "loads": "#047857", "torques": "#7C3AED", "weights": "#64748B", "contacts": "#D55E00"}
+TITLES = {"forces": "forces in joints", "moments": "torques in joints", "loads": "forces of loads", "torques": "torques of loads",
+          "weights": "weights", "contacts": "forces of contacts"}
+COLORS = {"forces": "#7C2D12", "moments": "#312E81", "loads": "#047857", "torques": "#7C3AED", "weights": "#64748B",
+          "contacts": "#D55E00"}
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Arrows:
     @property
     def turns(self) -> bool:
         """Whether these are torques."""
-        return self.layer == "torques"
+        return self.layer in ("torques", "moments")
 
     @property
     def color(self) -> str:
@@ -86,21 +87,22 @@ def arrows_of(solution: Solution, length: float, forces: bool = False) -> list[A
     """The arrows of a motion: forces of contacts, where there are some.
 
     length   of the mechanism, m
-    forces   with forces in joints and of loads and weights, all forces to one scale, and torques of loads; what is zero all
-             the time, or rounding, is left out
+    forces   with forces in joints and of loads and weights, all forces to one scale, and torques in joints and of loads, all to
+             another; what is zero all the time, or rounding, is left out
     """
     found = [*_contacts(solution, length)]
     if forces:
         others = [one for kind in (_joints, _loads, _weights) for one in kind(solution)]
         common = max([*[one.largest for one in others if not one.turns], *[usual(one.vectors) for one in found]], default=0.0)
         found = [replace(one, scale=LARGEST * length / common) for one in found]
+        turning = max((one.largest for one in others if one.turns), default=0.0)
         strongest = max([common, *[one.largest for one in found]])
         for one in others:
-            least = _ROUNDING * (max(one.largest, strongest * length) if one.turns else strongest)
+            least = _ROUNDING * (max(turning, strongest * length) if one.turns else strongest)
             sizes = np.nan_to_num(np.linalg.norm(one.vectors, axis=2)).max(axis=0, initial=0.0)
             acting = one.only(np.flatnonzero(sizes > least).tolist())
             if acting.names:
-                found.append(replace(acting, scale=LARGEST * length / (acting.largest if acting.turns else common)))
+                found.append(replace(acting, scale=LARGEST * length / (turning if acting.turns else common)))
     return [replace(one, head=FULL * length) for one in found]
 
 
@@ -115,8 +117,10 @@ def _contacts(solution: Solution, length: float) -> Iterator[Arrows]:
 def _joints(solution: Solution) -> Iterator[Arrows]:
     module, names, n_t = solution.module, solution.module.metadata.reactions, len(solution.t)
     if names and {REACTIONS, "joint_points"} <= set(module.functions):
-        yield Arrows("forces", [f"force of {name}" for name in names], _rows(solution, "joint_points")[..., 3:],
-                     solution.rows(REACTIONS).reshape(n_t, -1, 6)[..., :3], 0.0, points=[2 * k + 1 for k in range(len(names))])
+        at, acting = _rows(solution, "joint_points")[..., 3:], solution.rows(REACTIONS).reshape(n_t, -1, 6)
+        for layer, kind, part in (("forces", "force", acting[..., :3]), ("moments", "torque", acting[..., 3:])):
+            yield Arrows(layer, [f"{kind} of {name}" for name in names], at, part, 0.0,
+                         points=[2 * k + 1 for k in range(len(names))])
 
 
 def _loads(solution: Solution) -> Iterator[Arrows]:

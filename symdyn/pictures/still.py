@@ -28,7 +28,7 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
     """The mechanism at one time or several (default: start and end), side by side in axes of the same limits.
 
     view     elevation and azimuth of the eye, degrees, or one pair for each picture
-    forces   with arrows of forces in joints, loads and weights, and torques of loads
+    forces   with arrows of forces in joints, loads and weights, and torques in joints and of loads
 
     Returns the figure; saves it if a path is given. Raises ArgumentError for times outside of the motion, and if nothing can be
     drawn.

@@ -326,7 +326,7 @@ class Stage {
     }
 
     // What of one kind acts now, to its scale; on a dark ground in a lighter colour, as style.css has it for its check box.
-    drawArrows(scene, { layer, names, points, scale, longest, color: given, unit, now }, dark) {
+    drawArrows(scene, { names, points, scale, longest, color: given, unit, now }, dark) {
         const color = dark ? given.map(c => 0.2 + 0.8 * c) : given;
         const { source } = scene, wide = points.length ? 3 : 6;
         // Nothing hides a force.
@@ -335,7 +335,7 @@ class Stage {
             const at = points.length ? source.at(points[k]) : now.slice(wide * k, wide * k + 3), f = now.slice(wide * k + wide - 3, wide * k + wide);
             const n = size(f), long = this.forceScale * Math.min(n * scale, longest ?? Infinity);
             if (!(long >= 0.01 * this.length)) return;
-            const draw = layer !== "torques" ? this.arrow : this.planar ? this.arc : this.twoHeads;
+            const draw = unit !== "N m" ? this.arrow : this.planar ? this.arc : this.twoHeads;
             draw.call(this, scene, at, times(f, long / n), color, `${name}: ${n.toPrecision(4)} ${unit}`);
         });
         this.renderer.over(false);

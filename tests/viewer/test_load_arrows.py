@@ -83,7 +83,7 @@ def test_loads_can_be_seen_and_hidden(module: Module, chromium: Any, tmp_path: P
     solution.view(tmp_path / "view.html", forces=True)
     with Opened(chromium, tmp_path / "view.html") as opened:
         layers = {one["layer"]: one for one in opened.page.evaluate("symdyn.scenes[0].source.arrows")}
-        assert set(layers) == {"forces", "loads", "torques"}
+        assert set(layers) == {"forces", "moments", "loads", "torques"}
         data = layers["loads"]
         assert len(layers["torques"]["names"]) == 5 and "push on cart" in data["names"]
         rows = module.evaluate("applied_loads", 0.0, solution.x[0]).reshape(-1, 6)
@@ -117,7 +117,7 @@ def test_stills_films_and_pages_have_the_same_arrows(chromium: Any, tmp_path: Pa
         length = opened.page.evaluate("symdyn.stage.length")
         shown = {one["layer"]: one for one in opened.page.evaluate("symdyn.scenes[0].source.arrows")}
         picks = opened.page.evaluate("symdyn.scenes[0].picks")
-    assert set(shown) == set(drawn) == {"forces", "loads", "torques", "weights"}
+    assert set(shown) == set(drawn) == {"forces", "moments", "loads", "torques", "weights"}
     still = drawing.at(solution.t, np.array([0.1])).arrows
     largest = [one.ways for one in drawing.arrows if not one.arrows.turns]
     assert max(np.linalg.norm(ways, axis=2).max() for ways in largest) == pytest.approx(LARGEST * length)
@@ -144,7 +144,8 @@ def test_stills_and_films_explain_their_arrows(tmp_path: Path) -> None:
     figure = solution.picture([0.0, 0.1], tmp_path / "forces.png", forces=True)
     (legend,) = figure.legends
     texts = [text.get_text() for text in legend.get_texts()]
-    assert texts[-1] == "weights, up to 19.6 N" and texts[2].startswith("torques of loads, up to") and texts[2].endswith(" N m")
+    assert texts[-1] == "weights, up to 19.6 N" and texts[3].startswith("torques of loads, up to") and texts[3].endswith(" N m")
+    assert texts[1].startswith("torques in joints, up to")
     colors = {line.get_color() for line in figure.axes[0].lines}
     assert {line.get_color() for line in legend.get_lines()} <= colors
     assert not solution.picture(0.0).legends
@@ -177,6 +178,26 @@ def test_a_torque_in_a_plane_is_an_arc_that_turns_as_it_does(chromium: Any, tmp_
             picks = opened.page.evaluate("symdyn.scenes[0].picks.filter(p => p.name.startsWith('drive'))")
             found = np.array([pick["a"] for pick in picks])
             np.testing.assert_allclose(found[:, :2], curve[:len(found)], atol=1e-3 * length)
+
+
+def test_a_clamp_holds_its_beam_by_a_torque() -> None:
+    """M = m g l about the clamp, to the scale of the torque that a load exerts; nothing of a hinge in the plane."""
+    system = sd.System("clamped", gravity=[0, 0, -9.81])
+    beam = system.add_body("beam", mass=2.0, inertia=[0.1, 0.1, 0.1], com=[1.5, 0, 0])
+    system.add_joint(sd.Fixed("clamp", system.ground, beam))
+    wheel = system.add_body("wheel", mass=1.0, inertia=[0.1, 0.1, 0.1])
+    system.add_joint(sd.Revolute("axle", system.ground, wheel, axis=[0, 0, 1], coordinate=sd.coordinates("q"),
+                                 parent_point=[0, 1, 0]))
+    system.add_torque(wheel, [0, 0, 10.0], name="drive")
+    found = {one.layer: one for one in arrows_of(system.compile(backend="numpy").simulate((0, 0.1)), 3.0, forces=True)}
+    moments, torques = found["moments"], found["torques"]
+    assert moments.names == ["torque of clamp"] and torques.names == ["drive on wheel"]
+    np.testing.assert_allclose(moments.vectors[:, 0], [[0, -2 * 9.81 * 1.5, 0]] * len(moments.vectors), atol=1e-9)
+    np.testing.assert_allclose(moments.tails, 0.0, atol=1e-12)
+    assert moments.turns and moments.unit == "N m"
+    assert moments.scale == torques.scale == pytest.approx(LARGEST * 3.0 / (2 * 9.81 * 1.5))
+    plane = sd.systems.four_bar().compile(backend="numpy").simulate((0, 0.5))
+    assert "moments" not in {one.layer for one in arrows_of(plane, 1.0, forces=True)}
 
 
 def test_arrows_of_contacts_are_not_shown_twice() -> None:

@@ -673,8 +673,8 @@ class Solution:
 
         path      where to write it, one HTML file that needs no network; in a notebook the result shows itself
         compare   another motion, which is shown next to this one at the same times
-        forces    with the forces in the joints, the forces and torques of loads where they act, and weights as arrows; their
-                  code is compiled when it is first used
+        forces    with the forces and torques in the joints, those of loads where they act, and weights as arrows; their code is
+                  compiled when it is first used
         Raises ArgumentError for a module that gives no frames of bodies, for positions that are not finite, and for another
         ending than .html; MissingExtra without matplotlib.
 
