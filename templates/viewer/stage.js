@@ -60,23 +60,37 @@ class Stage {
         return found;
     }
 
+    // Tips of the arrows that are shown now.
+    tips({ source }) {
+        const found = [];
+        for (const arrows of source.arrows || []) if (this.layers[arrows.layer] !== false) arrows.names.forEach((_, k) => {
+            const [at, f, n, long] = this.arrowOf(source, arrows, k);
+            if (n > 0) found.push(add(at, f, long / n));
+        });
+        return found;
+    }
+
     // Look at all that is drawn, over the whole motion; while a body is followed, at the mechanism as it is now.
     fit() {
+        const tips = [];
         let all = this.scenes.map(scene => {
             const { source, data } = scene, now = source.time, found = [];
             const count = data.kind === "recorded" ? 40 : 1;
             for (let k = 0; k < count; k++) {
                 if (data.kind === "recorded") source.seek(source.t[Math.round((source.t.length - 1) * k / (count - 1))]);
                 found.push(...this.reach(scene));
+                tips.push(...this.tips(scene));
             }
             if (data.kind === "recorded") source.seek(now);
             return found;
         }).flat();
+        const lowest = all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
+        all = all.concat(tips);
         const low = [0, 1, 2].map(k => all.reduce((m, p) => Math.min(m, p[k]), Infinity));
         const high = [0, 1, 2].map(k => all.reduce((m, p) => Math.max(m, p[k]), -Infinity));
         // The grid lies on level ground, else below all that is drawn.
         const level = this.scenes[0].data.grounds.find(plane => inner(plane, this.up) > 1 - 1e-6);
-        this.floor = level ? level[3] : all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
+        this.floor = level ? level[3] : lowest;
         this.radius = Math.max(0.5 * size(minus(high, low)), 0.25 * this.length);
         this.middle = times(add(low, high), 0.5);
         let target = this.middle;
@@ -326,19 +340,26 @@ class Stage {
     }
 
     // What of one kind acts now, to its scale; on a dark ground in a lighter colour, as style.css has it for its check box.
-    drawArrows(scene, { names, points, scale, longest, color: given, unit, now }, dark) {
+    drawArrows(scene, arrows, dark) {
+        const { names, color: given, unit } = arrows;
         const color = dark ? given.map(c => 0.2 + 0.8 * c) : given;
-        const { source } = scene, wide = points.length ? 3 : 6;
+        const { source } = scene;
         // Nothing hides a force.
         this.renderer.over(true);
         names.forEach((name, k) => {
-            const at = points.length ? source.at(points[k]) : now.slice(wide * k, wide * k + 3), f = now.slice(wide * k + wide - 3, wide * k + wide);
-            const n = size(f), long = this.forceScale * Math.min(n * scale, longest ?? Infinity);
+            const [at, f, n, long] = this.arrowOf(source, arrows, k);
             if (!(long >= 0.01 * this.length)) return;
             const draw = unit !== "N m" ? this.arrow : this.planar ? this.arc : this.twoHeads;
             draw.call(this, scene, at, times(f, long / n), color, `${name}: ${n.toPrecision(4)} ${unit}`);
         });
         this.renderer.over(false);
+    }
+
+    // Where one of them begins, its vector with its size, and how long it is drawn.
+    arrowOf(source, { points, scale, longest, now }, k) {
+        const wide = points.length ? 3 : 6, at = points.length ? source.at(points[k]) : now.slice(wide * k, wide * k + 3);
+        const f = now.slice(wide * k + wide - 3, wide * k + wide), n = size(f);
+        return [at, f, n, this.forceScale * Math.min(n * scale, longest ?? Infinity)];
     }
 
     // Without light and shade: colours are what arrows are told apart by.

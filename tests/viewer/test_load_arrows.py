@@ -236,3 +236,21 @@ def test_colours_of_arrows_can_be_told_apart() -> None:
             lab = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116) @ to_lab.T
             apart = np.linalg.norm(lab[:, None] - lab, axis=2)[np.triu_indices(len(lab), 1)]
             assert apart.min() > 15, (lighter, apart.min())
+
+
+def test_arrows_are_within_the_window(chromium: Any, tmp_path: Path) -> None:
+    """From tail to tip, while the grid stays below the bodies: the weight reaches further down than the rod."""
+    system = sd.System("held", gravity=[0, 0, -9.81])
+    rod = system.add_body("rod", mass=2.0, inertia=[0.2, 0.2, 0.2], com=[1.0, 0, 0])
+    system.add_joint(sd.Fixed("clamp", system.ground, rod))
+    ball = system.add_body("ball", mass=0.01)
+    system.add_joint(sd.Prismatic("rail", system.ground, ball, axis=[0, 1, 0], coordinate=sd.coordinates("y")))
+    system.compile(backend="numpy").simulate((0, 0.1)).view(tmp_path / "view.html", forces=True)
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        inside, floor, lowest = opened.page.evaluate("""() => { const s = symdyn.stage, [scene] = symdyn.scenes;
+            s.draw(false);
+            const tips = s.tips(scene).map(p => s.project(p)), { clientWidth: w, clientHeight: h } = s.canvas;
+            return [tips.map(p => p[0] > 0 && p[0] < w && p[1] > 0 && p[1] < h), s.floor,
+                Math.min(...s.tips(scene).map(p => p[2]))]; }""")
+    assert len(inside) >= 3 and all(inside)
+    assert floor > lowest + 0.1
