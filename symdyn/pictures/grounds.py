@@ -23,7 +23,7 @@ COLOR = "#c4c9d1"
 # wide a curve is drawn.
 _PLANAR, _SPATIAL, _THICK, _HALF = 2.0, 0.3, 0.05, 0.12
 # Stations of a curve for a length of the mechanism, of all at most; of a surface along its longer side.
-_FINE, _MOST, _GRID = 120, 3000, 40
+_FINE, _MOST, _GRID = 60, 3000, 40
 # Points of a closed curve, and of a circle that stands for a hollow ball.
 _AROUND = 180
 # Digits of a normal after the point; normals that differ by less, and levels by less of the length, are the same.
@@ -103,8 +103,8 @@ def surroundings_of(records: Sequence[Mapping[str, Any]], reach: Reach, own_grou
     for record in records:
         kind, values = record["kind"], {name: np.array(rows, dtype=float) for name, rows in record["values"].items()}
         if kind == "mooring":
-            length, give, friction = values["numbers"][0]
-            lines[record["name"]] = Line(*map(float, (length, give, friction)), bool(record["seabed"]))
+            length, give, friction = map(float, values["numbers"][0])
+            lines[record["name"]] = Line(length, give, friction, bool(record["seabed"]))
             continue
         body = reach.bodies.index(record["body"]) if record["body"] in reach.bodies else -1
         if (body < 0 and own_ground) or not all(np.isfinite(rows).all() for rows in values.values()):

@@ -324,8 +324,8 @@ def _springs(m: Mechanism, r: float, length: float) -> Iterator[Item]:
             continue
         if kind == "line" and name in m.around.lines:
             hangs = m.around.lines[name]
-            size = (0.2 * r, _LINE * length, hangs.length, hangs.give, hangs.friction, float(hangs.seabed))
-            yield Item("mooring", ends, size, STEEL, f"{name} (mooring line)")
+            about = (hangs.length, hangs.give, hangs.friction, float(hangs.seabed))
+            yield Item("mooring", ends, (0.2 * r, _LINE * length, *about), STEEL, f"{name} (mooring line)")
             continue
         size = (0.3 * r,) if kind == "force" else (0.2 * r, _LINE * length) if kind == "line" else (1.3 * r,)
         yield Item("thread" if kind == "force" else kind, ends, size, STEEL,

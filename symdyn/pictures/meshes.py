@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -28,7 +28,8 @@ class Part:
     edges      (k, 4): two vertices, two faces (-1: none); creases: (k,), drawn from every side, others as outlines alone
     convex     whether it is; of any other, triangles are drawn by their distance, and `hidden` is a box around it
     width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another
-    ground     whether it is what bodies stand on: seen from both sides, behind all that the eye above it sees
+    ground     whether it is what bodies stand on: behind all that the eye above it sees; open: whether it has no inside, and is
+               seen from both sides
     """
 
     body: int
@@ -44,6 +45,7 @@ class Part:
     to: int | None = None
     convex: bool = True
     ground: bool = False
+    open: bool = False
 
 
 def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None = None, bends: bool = False) -> Iterator[Part]:
@@ -112,7 +114,7 @@ def _triangles(body: int, color: Color, vertices: np.ndarray, faces: np.ndarray)
 
 def ribbon(body: int, color: Color, points: np.ndarray, away: np.ndarray, half: float, ground: bool = True) -> Part:
     """A curve of a plane as a band from points (n, 3), which has what touches it on its left, to away from there, (3,) or (n, 3);
-    half: of its width across the plane, m."""
+    half: of its width across the plane, m. The ground has no outlines, of which a long road would have many."""
     up, n = np.array([0.0, 0.0, half]), len(points)
     vertices = np.stack([points + up, points - up, points + away - up, points + away + up], axis=1).reshape(-1, 3)
     rows = np.arange(n - 1)[:, None] * 4
@@ -121,7 +123,7 @@ def ribbon(body: int, color: Color, points: np.ndarray, away: np.ndarray, half: 
     first = rows // 4  # faces of a pair: those of another are n - 1 later
     edges = np.concatenate([np.column_stack([rows + k, rows + k + 4, first + (n - 1) * k, first + (n - 1) * ((k - 1) % 4)])
                             for k in range(4)])
-    return _boxed(body, color, vertices, tuple(faces), edges, ground)
+    return _boxed(body, color, vertices, tuple(faces), edges[:0] if ground else edges, ground)
 
 
 def sheet(body: int, color: Color, grid: np.ndarray, every: int) -> Part:
@@ -137,7 +139,7 @@ def sheet(body: int, color: Color, grid: np.ndarray, every: int) -> Part:
     lines = lines[finite[lines].all(axis=1)]
     place = np.cumsum(finite) - 1
     edges = np.column_stack([place[lines], np.full((len(lines), 2), -1)])
-    return _boxed(body, color, vertices[finite], tuple(place[faces]), edges, True)
+    return replace(_boxed(body, color, vertices[finite], tuple(place[faces]), edges, True), open=True)
 
 
 def prism(body: int, color: Color, outline: np.ndarray, half: float) -> Part:

@@ -61,7 +61,7 @@ class Scene(PolyCollection):
             part, places = self._solids.parts[k], self._places[k]
             normals, offsets = planes(places, part.corners)
             sides = camera.side(normals, offsets)
-            if part.ground:  # it has no inside
+            if part.open:
                 normals, sides = normals * np.sign(sides)[:, None], np.abs(sides)
             seen = np.append((sides > 0) & normals.any(axis=1), False)
             faces, own = np.flatnonzero(seen), part.edges[:, 2:]

@@ -130,8 +130,8 @@ def _around(m: Mechanism, axes: np.ndarray) -> Iterator[Shape]:
     """What contacts touch: the ground behind all bodies."""
     for part in m.around.parts:
         o, R = _frame(m, part.body)
-        for depth, *shape, kind in _of_part(part, o + part.vertices @ R.T, str(to_hex(part.color)), axes):
-            yield (-np.inf, *shape, "ground") if part.ground else (depth, *shape, kind)
+        for depth, points, wide, color, kind in _of_part(part, o + part.vertices @ R.T, str(to_hex(part.color)), axes):
+            yield (-np.inf, points, wide, color, "ground") if part.ground else (depth, points, wide, color, kind)
 
 
 def _of_part(part: Part, placed: np.ndarray, color: str, axes: np.ndarray) -> Iterator[Shape]:
@@ -140,7 +140,7 @@ def _of_part(part: Part, placed: np.ndarray, color: str, axes: np.ndarray) -> It
         a, b, c, d = placed[corners]
         normal = np.cross(c - a, d - b)
         toward = float(normal @ axes[2]) / (float(np.linalg.norm(normal)) or 1.0)
-        toward = abs(toward) if part.ground else toward
+        toward = abs(toward) if part.open else toward
         if toward > _EDGEWISE:
             points = placed[face]
             yield float(points.mean(axis=0) @ axes[2]), points @ axes[:2].T, 0.0, _shaded(color, toward), "polygon"
