@@ -51,7 +51,9 @@ def rope(a: np.ndarray, b: np.ndarray, length: float, up: np.ndarray) -> np.ndar
 
 def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float, friction: float, seabed: bool,
             shown: float = np.inf) -> np.ndarray:
-    """Points along a mooring line from its fairlead to its anchor, (POINTS, 3), evenly by its unstretched length.
+    """Points along a mooring line from its fairlead to its anchor, (POINTS, 3), evenly by the unstretched length of what hangs.
+
+    What lies on the seabed is straight.
 
     give    weight over EA; friction: with the seabed, where there is one; shown: how much of the line, from the fairlead, m
     Straight where no shape at rest is found, as where the fairlead is below the seabed.
@@ -70,7 +72,8 @@ def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float
         """Of what lies within a length u of where the line touches down, over `give`."""
         return np.asarray(h * np.minimum(u, tense) - friction / 2 * np.minimum(u, tense) ** 2)
 
-    s = np.linspace(1.0, 1.0 - share, POINTS)
+    end = 1.0 - share
+    s = np.append(np.linspace(1.0, lies, POINTS - 1), end) if lies > end else np.linspace(1.0, end, POINTS)
     on, up = np.minimum(s, lies), np.maximum(s - lies, 0.0)
     force = b + up  # the vertical one, over the weight of the line
     along = on + give * (stretch(np.array(lies)) - stretch(lies - on))

@@ -97,7 +97,8 @@ function lineForce(x, z, e, friction, seabed) {
     return null;
 }
 
-// Points along a mooring line from its fairlead to its anchor, evenly by its unstretched length: `mooring` of symdyn/pictures/ropes.py.
+// Points along a mooring line from its fairlead to its anchor, evenly by the unstretched length of what hangs: `mooring` of
+// symdyn/pictures/ropes.py.
 function mooringOf(fairlead, anchor, length, e, friction, seabed) {
     const way = minus(fairlead, anchor), far = Math.hypot(way[0], way[1]), count = 24;
     const x = Math.hypot(far, 2e-9 * length) / length, found = lineForce(x, way[2] / length, e, friction, seabed);
@@ -106,7 +107,7 @@ function mooringOf(fairlead, anchor, length, e, friction, seabed) {
     const tense = friction ? Math.min(lies, h / friction) : lies;
     const stretch = u => h * Math.min(u, tense) - friction / 2 * Math.min(u, tense) ** 2;
     return Array.from({ length: count + 1 }, (_, k) => {
-        const s = 1 - k / count, on = Math.min(s, lies), up = Math.max(s - lies, 0), force = b + up;
+        const s = !lies ? 1 - k / count : k < count ? 1 - (1 - lies) * k / (count - 1) : 0, on = Math.min(s, lies), up = Math.max(s - lies, 0), force = b + up;
         let along = on + e * (stretch(lies) - stretch(lies - on));
         if (h > 0) along += h * (Math.asinh(force / h) - Math.asinh(b / h)) + e * h * up;
         else if (lies) along = on * x / lies;
