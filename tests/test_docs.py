@@ -56,6 +56,21 @@ def test_the_index_lists_every_page() -> None:
     assert listed == set(NAMES.values()) - {"index", *OF_THE_PROJECT} | reference
 
 
+# The last commit with the README of 1,015 lines.
+FIRST_README = "0f9412ea7225952c8e68381541717c8e83880848"
+
+
+def test_every_section_of_the_first_readme_has_a_page() -> None:
+    """In the order of the README; that the pages are there is a test of all links."""
+    shown = subprocess.run(["git", "show", f"{FIRST_README}:README.md"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if shown.returncode:
+        pytest.skip("no history with the first README")
+    outside_code = re.sub(r"^```.*?^```$", "", shown.stdout, flags=re.DOTALL | re.MULTILINE)
+    rows = re.findall(r"^\| (.+?) \| (.+) \|$", (ROOT / "docs" / "old_readme.md").read_text(encoding="utf-8"), re.MULTILINE)[2:]
+    assert [section.strip("`") for section, _ in rows] == re.findall(r"^#+ (.+)$", outside_code, re.MULTILINE)
+    assert all("](" in pages for _, pages in rows)
+
+
 def texts_of(module: Path) -> Iterator[str]:
     """The texts in a module's code, values within them as "..."."""
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
