@@ -1,6 +1,7 @@
 """What the pages under docs show is what happens."""
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -69,6 +70,20 @@ def test_every_section_of_the_first_readme_has_a_page() -> None:
     rows = re.findall(r"^\| (.+?) \| (.+) \|$", (ROOT / "docs" / "old_readme.md").read_text(encoding="utf-8"), re.MULTILINE)[2:]
     assert [section.strip("`") for section, _ in rows] == re.findall(r"^#+ (.+)$", outside_code, re.MULTILINE)
     assert all("](" in pages for _, pages in rows)
+
+
+def test_the_table_of_derivatives_is_the_stored_result() -> None:
+    """Operations, times and ratios of docs/derivatives.md, row by row."""
+    page = (ROOT / "docs" / "derivatives.md").read_text(encoding="utf-8")
+    stored = json.loads((ROOT / "docs" / "measured" / "peers_of_derivatives.json").read_text(encoding="utf-8"))["lines"]
+    expected = []
+    for line in stored[1:]:
+        if len(cells := line.split()) > 12 and cells[1] == "embedding":
+            model, _, *operations, ns, casadi, _, _, _, ratio, times = cells[:12]
+            executed = " / ".join(f"{int(count):,}" for count in operations)
+            expected.append(f"| {model} | {executed} | {int(casadi):,} | {int(ns):,} ns | {ratio} | {times} |")
+    assert len(expected) == 4
+    assert [row for row in expected if row not in page] == []
 
 
 def texts_of(module: Path) -> Iterator[str]:
