@@ -130,6 +130,32 @@ def test_an_unwanted_word_is_found(tmp_path: Path) -> None:
                                                                         "module.py:1: 'anew'; write: again"]
 
 
+def prose_faults(texts: dict[str, str], folder: Path) -> list[str]:
+    """The complaints of proselint, by the rules of .proselintrc.json, with the paragraph."""
+    pytest.importorskip("proselint")
+    for name, text in texts.items():
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "proselint", "--config", ".proselintrc.json", "check", str(folder)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "Traceback" not in run.stderr and run.returncode in (0, 1), run.stderr
+    return [line for line in (run.stdout + run.stderr).splitlines() if line.strip()]
+
+
+def test_prose(tmp_path: Path) -> None:
+    """By proselint, without code and targets of links."""
+    def plain(paragraph: str) -> str:
+        return re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "code", paragraph))
+
+    texts = {f"{page.parent.name}-{page.stem}": "\n\n".join(plain(paragraph) for _, paragraph in paragraphs(page))
+             for page in PAGES}
+    assert prose_faults(texts, tmp_path) == []
+
+
+def test_faulty_prose_is_found(tmp_path: Path) -> None:
+    (fault,) = prose_faults({"page": "The most unique joint is revolute... as \"usual\".\n"}, tmp_path)
+    assert "uncomparables" in fault and "page.md:1:" in fault
+
+
 def test_spelling() -> None:
     """By codespell, with the words that pyproject.toml lists."""
     pytest.importorskip("codespell_lib")
