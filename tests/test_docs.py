@@ -86,6 +86,25 @@ def test_the_table_of_derivatives_is_the_stored_result() -> None:
     assert [row for row in expected if row not in page] == []
 
 
+def test_errors_against_tolerances_are_the_stored_ones() -> None:
+    """The table of docs/choosing_a_method.md, and the factors between error and tolerance that its text has."""
+    page = (ROOT / "docs" / "choosing_a_method.md").read_text(encoding="utf-8")
+    head, *rows = [re.split(r"\s{2,}", line) for line in json.loads(
+        (ROOT / "docs" / "measured" / "tolerance.json").read_text(encoding="utf-8"))["lines"]]
+    errors = {f"{name}, {after}": dict(zip(map(float, head[2:]), row, strict=True)) for name, after, *row in rows}
+    shown = re.findall(r"^\| (\w+, \d+ s) \| (.+) \|$", page, re.MULTILINE)
+    assert len(shown) == 4
+    for name, cells in shown:
+        assert cells.split(" | ") == [errors[name][tolerance] for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)], name
+    factors = {name: [float(error) / tolerance for tolerance, error in row.items()] for name, row in errors.items()}
+    for name in ("pendulum, 10 s", "car_axis, 3 s"):
+        assert 3 < min(factors[name]) and max(factors[name]) < 50
+    assert max(factors["double_pendulum, 2 s"]) < 1.45
+    assert 1e4 < min(factors["double_pendulum, 10 s"][5:10]) and max(factors["double_pendulum, 10 s"][5:10]) < 4e4
+    assert min(float(error) for tolerance, error in errors["n_link_pendulum(5), 10 s"].items() if tolerance >= 1e-8) > 0.5
+    assert errors["n_link_pendulum(5), 10 s"][1e-12] == "2.0e-04"
+
+
 def texts_of(module: Path) -> Iterator[str]:
     """The texts in a module's code, values within them as "..."."""
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):

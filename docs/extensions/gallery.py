@@ -72,7 +72,7 @@ class Gallery(SphinxDirective):
                   "touching": touching, "floating": [name for name in others if name not in touching]}
         cards = "".join(
             f'<a href="gallery/{name}.html"><img src="_static/{name}.svg" alt="{name}" width="260" height="200" loading="lazy">'
-            f"<b>{name}</b><span>{escape(summary(name))}</span></a>" for name in groups[self.arguments[0]])
+            f"<b>{name.replace('_', '_<wbr>')}</b><span>{escape(summary(name))}</span></a>" for name in groups[self.arguments[0]])
         contents = nodes.raw("", f'<div class="gallery">{cards}</div>', format="html")
         return [contents, *self.parse_text_to_nodes(
             "\n".join(["```{toctree}", ":hidden:", "", *[f"gallery/{name}" for name in groups[self.arguments[0]]], "```"]))]

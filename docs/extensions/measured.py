@@ -41,10 +41,12 @@ COMMANDS = {
     "printing": "symdyn bench printing",
     "sympy": "symdyn bench sympy",
     "comparison": "symdyn compare --all",
+    "tolerance": "python docs/extensions/tolerance.py",
     "reference": "python tests/checks/public_names.py generated/site",
+    "walk": "python tests/checks/walk.py generated/site",
 }
 # A line with a figure, as the lab prints it: its name, the number, the unit, the bound, whether that is missed.
-FIGURE = re.compile(r"(?P<name>\S.*?)\s+(?P<value>-?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan))"
+FIGURE = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<value>-?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan))"
                     r"(?: (?P<unit>[^\s<>]+))?\s*(?P<bound>(?:<=?|>=) \S+)?\s*(?P<missed>MISSED)?")
 
 
@@ -84,15 +86,21 @@ def machine() -> str:
     return f"{found[1] if found else platform.machine()}, {cores} cores, {compiler}, Python {platform.python_version()}"
 
 
-def rows_of(result: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """The head and the rows of a table; no rows of what is no table of figures."""
+def rows_of(result: dict[str, Any]) -> tuple[list[str], list[list[str]], list[str]]:
+    """The head and the rows of a table, and the lines below it; no rows of what is no table."""
     if "rows" in result:
-        return result["head"], result["rows"]
-    found = [FIGURE.fullmatch(line) for line in result["lines"]]
-    if not all(found):
-        return [], []
-    return ["", "measured", "bound"], [[one["name"], f"{one['value']} {one['unit'] or ''}".strip(), " ".join(
-        filter(None, (one["bound"], one["missed"] and "(missed)")))] for one in found if one]
+        return result["head"], result["rows"], []
+    lines = result["lines"]
+    found = [FIGURE.fullmatch(line) for line in lines]
+    if all(found):
+        return ["", "measured", "bound"], [[one["name"], f"{one['value']} {one['unit'] or ''}".strip(), " ".join(
+            filter(None, (one["bound"], one["missed"] and "(missed)")))] for one in found if one], []
+    # Columns that are two or more spaces apart, without an empty cell; the last one may have two.
+    head, *cells = [re.split(r"\s{2,}", line.strip()) for line in lines]
+    count = next((k for k, row in enumerate(cells) if len(row) - len(head) not in (0, 1)), len(cells))
+    if len(head) < 3 or not count:
+        return [], [], lines
+    return head, [[*row[:len(head) - 1], ": ".join(row[len(head) - 1:])] for row in cells[:count]], lines[1 + count:]
 
 
 class Measured(SphinxDirective):
@@ -109,11 +117,11 @@ class Measured(SphinxDirective):
         load = f" The load average was {result['load']:g} when it began." if result.get("load", 0) >= 1 else ""
         about = nodes.paragraph("", "", nodes.literal("", result["command"]), nodes.Text(
             f", {result['date']}: {result['machine']}.{took}{load}"), classes=["measured"])
-        head, rows = rows_of(result)
-        if not rows:
-            text = "\n".join(result["lines"][:self.options.get("lines")])
-            return [about, nodes.literal_block(text, text, language="text", classes=["printed"])]
-        return [about, table(head, rows)]
+        head, rows, below = rows_of(result)
+        shown: list[nodes.Node] = [about, table(head, rows)] if rows else [about]
+        if text := "\n".join(below[:self.options.get("lines")]):
+            shown.append(nodes.literal_block(text, text, language="text", classes=["printed"]))
+        return shown
 
 
 def table(head: list[str], rows: list[list[str]]) -> nodes.container:

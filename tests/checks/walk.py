@@ -1,0 +1,145 @@
+"""A newcomer's walk: the README's own set-up in a fresh clone, then each tutorial and each command with copy and paste only.
+
+python -m sphinx -W -b html docs generated/site && python tests/checks/walk.py generated/site
+
+prints the minutes of every step. Tutorials are the blocks of code of the built pages, one after the other, in an empty folder.
+Commands are those that the README and the pages of COMMANDS print; some are left out, with the reason.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import unescape
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+# Pages with code to copy, besides the tutorials; and those with commands, whose files are made from blocks of the pages before.
+FIRST = ("start",)
+COMMANDS = ("start", "command_line")
+# Seconds that one step may take.
+LIMIT = 900
+# Commands that are not tried.
+LEFT_OUT = {
+    "python3 -m venv .venv && .venv/bin/pip install -q -e '.[test]' && .venv/bin/python -m pytest -n 2 --dist worksteal":
+        "runs the whole suite, as .ci/run does",
+    ".venv/bin/jupyter lab notebooks": "serves until it is stopped",
+    "symdyn compare --all": "has a stored result on the page of measured figures",
+    "symdyn bench figures": "has a stored result on the page of measured figures",
+    "symdyn bench double_pendulum": "takes minutes; symdyn bench my_mechanism.py is tried",
+    "symdyn stress": "takes minutes; symdyn stress my_mechanism.py is tried",
+    "symdyn --print-completion bash > ~/.local/share/bash-completion/completions/symdyn": "writes into the shell's own folder",
+}
+WIDTH = 84
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step, its minutes, and how it ended: "done", or why it failed or was left out."""
+
+    name: str
+    minutes: float | None
+    end: str
+
+    @property
+    def line(self) -> str:
+        return f"{self.name:<{WIDTH}}  {'-' if self.minutes is None else f'{self.minutes:.2f}':>7}  {self.end}"
+
+
+def blocks(page: str, kind: str) -> list[str]:
+    """The blocks of code of a page of the site, as its button copies them."""
+    found = re.findall(rf'<div class="highlight-{kind} notranslate"><div class="highlight"><pre>(.*?)</pre>', page, re.DOTALL)
+    return [unescape(re.sub("<[^>]+>", "", block)) for block in found]
+
+
+def tutorials(site: Path) -> list[str]:
+    """The pages of tutorials in the order in which their page lists them."""
+    listed = (site / "tutorials.html").read_text(encoding="utf-8")
+    return list(dict.fromkeys(re.findall(r'href="(tutorials/\w+)\.html"', listed)))
+
+
+def commands(text: str) -> list[str]:
+    """The commands of a block: without comments, and without what a list says of each after two or more spaces."""
+    lines = [re.split(r"\s{2,}|\s#", line.strip())[0] for line in text.splitlines()]
+    return [line for line in lines if re.match(r"(python3|\.venv/bin/|symdyn )", line)]
+
+
+def tried(name: str, command: str, folder: Path) -> Step:
+    """Run a command of the shell as a newcomer has it: nothing of this process's Python, and no browser that opens."""
+    mine = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "PYTHONDONTWRITEBYTECODE")
+    clean = {name: value for name, value in os.environ.items() if name not in mine}
+    clean |= {"SYMDYN_CACHE_DIR": str(folder.parent / "cache"), "BROWSER": "true", "MPLBACKEND": "agg"}
+    begun = time.monotonic()
+    try:
+        run = subprocess.run(command, shell=True, cwd=folder, env=clean, capture_output=True, text=True, check=False,
+                             timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return Step(name, LIMIT / 60, f"FAILED: not at its end after {LIMIT} s")
+    last = (run.stderr.strip() or run.stdout.strip() or "no output").splitlines()[-1]
+    return Step(name, (time.monotonic() - begun) / 60, "done" if run.returncode == 0 else f"FAILED: {last[:200]}")
+
+
+def walk(site: Path, folder: Path) -> Iterator[Step]:
+    """All steps, each run when it is asked for."""
+    clone, work = folder / "symdyn", folder / "work"
+    subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
+    readme = (clone / "README.md").read_text(encoding="utf-8")
+    for command in commands("\n".join(re.findall(r"```bash\n(.*?)```", readme, re.DOTALL))):
+        yield step("README: ", command, clone)
+    (both,) = blocks((site / "tutorials.html").read_text(encoding="utf-8"), "bash")
+    for command in both.strip().split(" && "):
+        yield step("tutorials: ", command, clone)
+    codes = {name: blocks((site / f"{name}.html").read_text(encoding="utf-8"), "python") for name in (*FIRST, *tutorials(site))}
+    for name, code in {"README, example": re.findall(r"```python\n(.*?)```", readme, re.DOTALL), **codes}.items():
+        empty = folder / re.sub(r"\W+", "_", name)
+        empty.mkdir()
+        (empty / "page.py").write_text("\n".join(code), encoding="utf-8")
+        yield tried(f"{name}: {len(code)} block{'s' * (len(code) > 1)}", f"{clone}/.venv/bin/python page.py", empty)
+    work.mkdir()
+    files(site, work)
+    for command in printed(site):
+        yield step("", command, work, f"{clone}/.venv/bin/")
+
+
+def printed(site: Path) -> list[str]:
+    """The commands of symdyn that the pages of COMMANDS print."""
+    pages = [(site / f"{name}.html").read_text(encoding="utf-8") for name in COMMANDS]
+    lists = [block for page in pages for kind in ("default", "none", "bash") for block in blocks(page, kind)]
+    return list(dict.fromkeys(command.removeprefix(".venv/bin/") for block in lists for command in commands(block)))
+
+
+def files(site: Path, folder: Path) -> None:
+    """The files that commands name, copied from the pages that show them."""
+    (mechanism,) = blocks((site / "command_line.html").read_text(encoding="utf-8"), "python")
+    (sweep,) = blocks((site / "many_at_once.html").read_text(encoding="utf-8"), "toml")
+    (folder / "my_mechanism.py").write_text(mechanism, encoding="utf-8")
+    (folder / "my_sweep.toml").write_text(sweep, encoding="utf-8")
+
+
+def step(before: str, command: str, folder: Path, programs: str = "") -> Step:
+    """A command that is tried, or left out; programs: the folder of the environment, where the page leaves it to the shell."""
+    name = before + command
+    return Step(name, None, f"left out: {LEFT_OUT[command]}") if command in LEFT_OUT else tried(name, programs + command, folder)
+
+
+def main(site: Path) -> int:
+    print(f"{'step':<{WIDTH}}  {'minutes':>7}  end")
+    steps = []
+    with tempfile.TemporaryDirectory(prefix="symdyn-walk-") as folder:
+        for one in walk(site, Path(folder)):
+            print(one.line, flush=True)
+            steps.append(one)
+    failed = sum(one.end.startswith("FAILED") for one in steps)
+    print(f"{sum(one.end == 'done' for one in steps)} done, {failed} failed, "
+          f"{sum(one.minutes is None for one in steps)} left out; {sum(one.minutes or 0 for one in steps):.0f} minutes in all")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).resolve()))
