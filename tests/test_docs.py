@@ -98,9 +98,9 @@ def test_errors_against_tolerances_are_the_stored_ones() -> None:
         assert cells.split(" | ") == [errors[name][tolerance] for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)], name
     factors = {name: [float(error) / tolerance for tolerance, error in row.items()] for name, row in errors.items()}
     for name in ("pendulum, 10 s", "car_axis, 3 s"):
-        assert 3 < min(factors[name]) and max(factors[name]) < 50
+        assert min(factors[name]) > 3 and max(factors[name]) < 50
     assert max(factors["double_pendulum, 2 s"]) < 1.45
-    assert 1e4 < min(factors["double_pendulum, 10 s"][5:10]) and max(factors["double_pendulum, 10 s"][5:10]) < 4e4
+    assert min(factors["double_pendulum, 10 s"][5:10]) > 1e4 and max(factors["double_pendulum, 10 s"][5:10]) < 4e4
     assert min(float(error) for tolerance, error in errors["n_link_pendulum(5), 10 s"].items() if tolerance >= 1e-8) > 0.5
     assert errors["n_link_pendulum(5), 10 s"][1e-12] == "2.0e-04"
 

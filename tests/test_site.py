@@ -17,6 +17,7 @@ from urllib.parse import unquote
 import pytest
 
 import symdyn as sd
+from tests.checks import walk
 from tests.helpers import CONTRAST, browser
 
 ROOT = Path(__file__).parents[1]
@@ -76,6 +77,10 @@ def test_docstrings_are_typeset(site: Path) -> None:
     event = event[:event.index("</dd></dl>")]
     assert re.search(r"<dt>direction</dt><dd><p>1: only upwards through zero, -1: only downwards", event)
     assert 'class="doctest' in event and "``" not in re.sub(r"<[^>]+>", "", page)
+    for page in (site / "reference").glob("*.html"):
+        assert not re.search("=====|``|:ref:", re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8"))), page.name
+    symbols = (site / "reference" / "symbols.html").read_text(encoding="utf-8")
+    assert "in loads and outputs; <code" in symbols and 'id="symdyn.t"' in symbols
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -243,6 +248,28 @@ def test_measured_figures_are_rows_of_tables(site: Path) -> None:
     assert "<td><p>spatial_chain(7): operations of the right-hand side</p></td>\n<td><p>1191</p></td>" in page
     counted = unescape(re.sub("<[^>]+>", "", (site / "index.html").read_text(encoding="utf-8")))
     assert "public names have an entry in the reference" in counted and "have an example that runs" in counted
+
+
+def test_the_walk_tries_what_the_pages_print(site: Path) -> None:
+    """Every tutorial and every command; what is left out is printed somewhere, and the stored walk had the same steps."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = walk.commands("\n".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL)))
+    (both,) = walk.blocks((site / "tutorials.html").read_text(encoding="utf-8"), "bash")
+    commands = {*readme, *both.strip().split(" && "), *walk.printed(site)}
+    assert {"symdyn list", "symdyn view four_bar", "symdyn report my_mechanism.py --full"} <= commands
+    assert set(walk.LEFT_OUT) < commands
+    pages = walk.tutorials(site)
+    assert {page.removeprefix("tutorials/") for page in pages} == {source.stem for source in (ROOT / "notebooks").glob("*.py")}
+    lines = json.loads((ROOT / "docs" / "measured" / "walk.json").read_text(encoding="utf-8"))["lines"]
+    steps = {re.split(r"\s{2,}", line)[0].removeprefix("README: ").removeprefix("tutorials: "): line for line in lines[1:-1]}
+    assert commands <= set(steps) and {name.partition(":")[0] for name in steps} >= set(pages)
+    assert all(line.endswith("done") or "left out: " in line for line in steps.values())
+
+
+def test_a_step_of_the_walk_that_fails_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "page.py").write_text("raise SystemExit('no such mechanism')\n", encoding="utf-8")
+    assert walk.tried("page", f"{sys.executable} page.py", tmp_path).end == "FAILED: no such mechanism"
+    assert walk.tried("page", f"{sys.executable} -c 'print(1)'", tmp_path).end == "done"
 
 
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:

@@ -65,18 +65,21 @@ def _with_items(block: list[str]) -> list[str]:
     result = _paragraphs(block[:first])
     name = ""
     texts: list[str] = []
+    after: list[str] = []  # sentences below items
     for line in [*block[first:], ""]:
         item = ITEM.fullmatch(line)
-        if item or not line or not line.startswith(" "):
-            if name:
-                result += [paragraph(name), f"    {paragraph(' '.join(texts))}", ""]
+        if name and not line.startswith(" "):
+            result += [paragraph(name), f"    {paragraph(' '.join(texts))}", ""]
             name, texts = "", []
+        if item or not line:
+            result += _paragraphs(after)
+            after = []
         if item:
             name, texts = item[1], [item[2]]
-        elif line.startswith(" "):
+        elif name:
             texts.append(line.strip())
-        elif line:  # a sentence after the list
-            result += [paragraph(line), ""]
+        else:
+            after.append(line)
     return result
 
 

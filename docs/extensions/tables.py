@@ -6,7 +6,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 
 # Characters of a short cell.
-SHORT = 14
+SHORT = 16
 
 
 def mark(app: Sphinx, tree: nodes.document) -> None:
