@@ -184,4 +184,4 @@ axes.set_title("Two steel spheres hit at 1 m/s", fontsize=10)
 plt.show()
 
 # %% [markdown]
-# More: [contact.md](../docs/contact.md) has the shapes, the laws, and what happens at a switch.
+# More: [Contact](../docs/contact.md) has the shapes, the laws, and what happens at a switch.
