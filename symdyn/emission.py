@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from symdyn import kinds
 from symdyn.arguments import some
@@ -14,12 +14,17 @@ from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.backend.source import Source, render
 from symdyn.collector import collector_paused
+from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.functions.content import content_of
 from symdyn.functions.tapes import columns_of
 from symdyn.runtime.building.stored import write_whole
 from symdyn.runtime.paths import as_path
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Rolling
 
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
@@ -27,7 +32,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
          batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
          adjoint: tuple[str, ...] | None = None, held: tuple[str, ...] = (),
-         followed: tuple[str, ...] = (), open_contacts: bool = False, threads: bool = False) -> Source:
+         followed: tuple[str, ...] = (), open_contacts: bool = False, threads: bool = False,
+         rolled: Rolling = "auto") -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -41,15 +47,20 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     open_contacts   leave out what closed rigid contacts do, see RightSide
     threads      C only: the text of a kernel that integrates many motions by a thread each, see RightSide
     states       how many random states the reference vectors of a standalone source begin with
+    rolled       C only: whether statements that a function repeats, as for like bodies, become loops: "auto" where these are many
+                 and the templates are the shipped ones, True wherever some are, False nowhere
 
-    Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
+    Raises SymdynError for an unknown function, parameter, backend, method or a broken template, for another value of rolled, and
+    for loops that a backend has no words for.
     """
     if standalone and equations.again is not None:
         equations = equations.again()
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     kinds.text(backend, f"{equations.name}: the backend", "c")
     method_of(method)
+    rolled = rolling(rolled)
     if templates is not None:
+        rolled = rolled is True
         as_path(templates, "of the templates", "my_templates")
     names = groups.written(equations, functions, method if integrator and backend == "c" else None)
     with collector_paused():
@@ -58,7 +69,16 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         columns = columns_of if backend == "c" and not standalone and not threads and templates is None else None
         right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts, threads)
         content = content_of(equations, names, standalone, bound, right_side, columns)
-        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads)
+        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads, rolled=rolled)
+
+
+def rolling(rolled: Any) -> Rolling:
+    """The option as it is given. Raises SymdynError for another value."""
+    if rolled is True or rolled is False:
+        return rolled is True
+    if isinstance(rolled, str) and rolled == "auto":
+        return "auto"
+    raise SymdynError(f"rolled is {shown(rolled)}; pass True, False or 'auto'")
 
 
 def write_source(source: Source, folder: Path) -> list[Path]:

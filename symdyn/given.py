@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import sympy as sp
@@ -58,5 +58,7 @@ if TYPE_CHECKING:
     # Symbols or names.
     Names: TypeAlias = Sequence[str] | Sequence[sp.Symbol] | Sequence[Key] | Key
     PathName: TypeAlias = str | PathLike[str]
+    # Whether statements that are repeated become loops.
+    Rolling: TypeAlias = bool | Literal["auto"]
     # The mode of a rigid contact, with a direction of slip where it has none.
     ContactMode: TypeAlias = str | tuple[str, float | Row]

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,17 +23,22 @@ from symdyn.runtime.building.texts import Texts
 from symdyn.tape.jumps import breaks
 from symdyn.tape.tape import Tape
 
+if TYPE_CHECKING:
+    from symdyn.given import Rolling
+
 
 class Libraries:
     """The libraries of a module, each made when it is first requested; pickled with the text of those that were made.
 
     again       derives the equations; None: only those that were made can be had elsewhere
+    rolled      whether statements that are repeated become loops, as for `emit`
     equations   None where they were not needed so far; texts: what was generated already
     """
 
     def __init__(self, again: Callable[[], Equations] | None, backend: str, templates: str | os.PathLike | None,
                  specialize: Mapping[Any, float] | None, fallback: str, equations: Equations | None = None,
-                 texts: Texts | None = None) -> None:
+                 texts: Texts | None = None, rolled: Rolling = "auto") -> None:
+        self.rolled = rolled
         self.again, self.backend, self.templates, self.specialize, self.fallback = again, backend, templates, specialize, fallback
         self._equations = equations
         self.texts = texts or Texts(backend)
@@ -48,7 +53,8 @@ class Libraries:
         return self._equations
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback, None, self.texts)
+        return Libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback, None, self.texts,
+                           self.rolled)
 
     @cached_property
     def rhs(self) -> Source:
@@ -60,10 +66,10 @@ class Libraries:
             return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                         work=what.work, baumgarte=what.baumgarte, method=what.method,
                         sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held,
-                        followed=what.followed, open_contacts=what.open_contacts, threads=what.threads)
+                        followed=what.followed, open_contacts=what.open_contacts, threads=what.threads, rolled=self.rolled)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
-                    batch=what == BATCH)
+                    batch=what == BATCH, rolled=self.rolled)
 
     def __call__(self, what: str | RightSide) -> Unit:
         """The library for a right-hand side, or that holds a function."""
@@ -89,9 +95,10 @@ class Libraries:
         return self.equations.base_parameters().names
 
     def write(self, folder: Path) -> list[Path]:
-        return write_source(emit(self.equations, self.backend, templates=self.templates, specialize=self.specialize), folder)
+        return write_source(emit(self.equations, self.backend, templates=self.templates, specialize=self.specialize,
+                                 rolled=self.rolled), folder)
 
     def report(self) -> Any:
         from symdyn.report.text import report
 
-        return report(self.equations, self.backend, self.fallback)
+        return report(self.equations, self.backend, self.fallback, self.rhs)

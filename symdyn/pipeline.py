@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from symdyn.emission import emit, write_source
+from symdyn.emission import emit, rolling, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions.content import module_metadata
@@ -25,16 +25,20 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from symdyn.given import Rolling
+
 __all__ = ["compile_equations", "emit", "write_source"]
 
 
 def compile_equations(equations: Equations, backend: str | None = None, templates: str | os.PathLike | None = None,
-                      specialize: Mapping[Any, float] | None = None) -> Module:
+                      specialize: Mapping[Any, float] | None = None, rolled: Rolling = "auto") -> Module:
     """A numeric module from equations.
 
     backend      "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
     templates    folder whose templates take precedence
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
+    rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False
 
     Only what is called is generated: rhs with the integrator first, every other function when it is first used.
     Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
@@ -50,6 +54,6 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         raise SymdynError(f"backend {shown(backend)} asked for; modules can be loaded from 'c' and 'numpy'; "
                           "emit() writes source for others")
 
-    libraries = Libraries(equations.again, backend, templates, specialize, fallback, equations)
+    libraries = Libraries(equations.again, backend, templates, specialize, fallback, equations, rolled=rolling(rolled))
     return Module(module_metadata(equations, libraries.rhs.metadata), libraries, backend, fallback, libraries.write,
                   libraries.report)

@@ -15,6 +15,7 @@ from symdyn.tape.reserved import RESERVED
 
 LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
 PARTS = ("whole", "longest", "load", "store")
+LOOPS = ("index", "begin", "end", "carried", "assign", "integers", "numbers", "item", "sines")
 SINCOS = ("least", "take", "sin", "cos")
 CALL = ("take", "item")
 
@@ -47,6 +48,29 @@ class Parts:
     longest: int
     load: str
     store: str
+
+
+@dataclass(frozen=True)
+class Loops:
+    """How steps that a function repeats are written as a loop; what is handed on stands in the array that parts have.
+
+    index            the variable that counts trips, from 0
+    begin, end       lines around the statements of a trip; {n}: the number of trips
+    carried, assign  what makes a variable that changes, and what changes it, with {name} and {value}
+    integers, numbers   tables with {name} and {values}, an entry for each trip; item: what reads the entry of this trip
+    sines            takes all sines and cosines at once, of {n} angles from the first place on; puts them from {sines} and
+                     {cosines} on
+    """
+
+    index: str
+    begin: str
+    end: str
+    carried: str
+    assign: str
+    integers: str
+    numbers: str
+    item: str
+    sines: str
 
 
 @dataclass(frozen=True)
@@ -92,6 +116,7 @@ class Dialect:
     sincos       sines and cosines taken all at once; None where each is an operation like any other
     call         how numeric algorithms are called; None if the language has none
     parts        how long functions are divided; None if they are not
+    loops        how steps that are repeated become loops, which takes parts, too; None if they do not
     read         format of an assignment of what does not depend on a direction, where statements are those of directions
     zeros        a statement that makes all {n} results zero, before the others of many zeros; None: each is stored
     words        what names in this language must not be, besides the words that no language has as names
@@ -112,6 +137,7 @@ class Dialect:
     sincos: SinCos | None = None
     madd: str | None = None
     parts: Parts | None = None
+    loops: Loops | None = None
     call: Call | None = None
     zeros: str | None = None
     read: str | None = None
@@ -148,6 +174,7 @@ def read_dialect(folder: Path) -> Dialect:
                                           "files", "madd", "zeros", "read", "words", "caseless") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
                    parts=Parts(**table["parts"]) if "parts" in table else None,
+                   loops=Loops(**table["loops"]) if "loops" in table else None,
                    call=Call(**table["call"]) if "call" in table else None)
 
 
@@ -176,6 +203,16 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         faults += [f"parts.{key} is not known" for key in parts if key not in PARTS]
         trials += [(f"parts.{key}", parts[key], {"k": 0, "value": "a"} if key == "store" else {"k": 0})
                    for key in ("load", "store") if key in parts]
+    if "loops" in table:
+        loops = table["loops"]
+        faults += ["loops takes parts, which are missing"] * ("parts" not in table)
+        faults += [f"loops.{key} is missing" for key in LOOPS if key not in loops]
+        faults += [f"loops.{key} is not known" for key in loops if key not in LOOPS]
+        given: dict[str, dict[str, Any]] = {
+            "begin": {"n": 1}, "carried": {"name": "a", "value": "b"}, "assign": {"name": "a", "value": "b"},
+            "integers": {"name": "a", "values": "1"}, "numbers": {"name": "a", "values": "1.0"}, "item": {"name": "a"},
+            "sines": {"n": 1, "sines": 1, "cosines": 2}}
+        trials += [(f"loops.{key}", loops[key], given[key]) for key in LOOPS if key in loops and key in given]
     if "call" in table:
         call = table["call"]
         faults += [f"call.{key} is missing" for key in CALL if key not in call]

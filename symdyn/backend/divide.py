@@ -19,7 +19,7 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
     that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
     others, `longest` by each.
     """
-    stretches = _stretches(_products_beside_their_sums(body, entries), longest)
+    stretches = stretches_of(products_beside_their_sums(body, entries), longest)
     begin = len(stretches) - 1
     if len(entries) > longest:
         begin += 1
@@ -55,7 +55,7 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
     return result, slots, count
 
 
-def _products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
+def products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
     """The steps with each product that only one sum needs just before that sum, so that both become one operation."""
     uses = Counter(unsigned(a) for values in [*[n.args for n in body], entries] for a in values)
     steps = set(body)
@@ -69,7 +69,7 @@ def _products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) ->
     return ordered
 
 
-def _stretches(body: Sequence[Node], longest: int) -> list[list[Node]]:
+def stretches_of(body: Sequence[Node], longest: int) -> list[list[Node]]:
     stretches: list[list[Node]] = [[]]
     for node in body:
         current = stretches[-1]

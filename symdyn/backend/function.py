@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from symdyn.tape.node import Node
 
@@ -25,6 +25,7 @@ class Part:
     arguments   groups it reads, of t q u z ud inputs p c, in this order; it also gets w, which holds what parts hand on
     results     statements that keep values in w, or those that store the function's result
     stores      whether they store the result: the last part does, and of a long result as many parts as it takes
+    trips       of the loop that it is; 0: it is none
     """
 
     arguments: tuple[str, ...]
@@ -32,6 +33,7 @@ class Part:
     sections: tuple[Section, ...]
     results: tuple[str, ...]
     stores: bool = True
+    trips: int = field(default=0, repr=False)
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Function:
     parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
     regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
                 statements of its own
+    written     statements that stand in the code where loops repeat some; steps: those that run
     inlined     steps that are written where they are used: which products and sums become one depends on it
     values      of a Jacobian by several columns at once: the function that computes what all columns share, n_v numbers v
     along       and for each group of arguments the derivatives along a direction in it
@@ -66,6 +69,13 @@ class Function:
     values: Function | None = None
     along: tuple[Along, ...] = ()
     motion: Motion | None = None
+    written: int = 0
+    steps: int = 0
+
+    @property
+    def loops(self) -> tuple[int, ...]:
+        """The trips of its loops."""
+        return tuple(part.trips for part in self.parts if part.trips)
 
     @property
     def stores(self) -> bool:

@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import numpy as np
@@ -39,6 +39,9 @@ from symdyn.tape.algorithms import text_of
 from symdyn.tape.kernels import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
 from symdyn.turning import is_angle, turns
+
+if TYPE_CHECKING:
+    from symdyn.given import Rolling
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
            "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c",
@@ -120,7 +123,7 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
            integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
-           only: Sequence[str] = (), threads: bool = False) -> Source:
+           only: Sequence[str] = (), threads: bool = False, rolled: Rolling = "auto") -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -129,10 +132,11 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
     threads      C only: with the integrator of many trajectories by a thread each, which also compiles as CUDA C
+    rolled       whether what functions repeat becomes loops, see symdyn.backend.program.build; not in texts for devices
     states       how many random states the reference vectors begin with
     only         the templates of the files that are wanted, without reference vectors; none: all, or the first one where they are
                  not standalone
-    Raises SymdynError for an unknown backend or a broken template.
+    Raises SymdynError for an unknown backend, a broken template, and loops that a backend has no words for.
     """
     folders = template_folders(templates)
     known = backends(templates)
@@ -142,6 +146,9 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
                           "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
     folder = next(f / backend for f in folders if (f / backend / "dialect.toml").is_file())
     dialect = read_dialect(folder)
+    if rolled is True and dialect.loops is None:
+        raise SymdynError(f"rolled=True was asked for, and the backend {backend} writes no loops; take 'c', rolled='auto', or a "
+                          "dialect.toml with [loops]")
     environment = _environment(*folders) if templates is not None else _shipped(*folders)
     content = with_violation(content)
     places = {"t": ("t", 0)}
@@ -149,7 +156,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         places.update({name: (group, k) for k, name in enumerate(names)})
     vectors = read_dialect(folder / "columns") if content.jacobians else None
     program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.jacobians,
-                    vectors=vectors)
+                    vectors=vectors, rolled=not threads and rolled)
     lanes, many = None, None
     if backend == "c":
         shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())

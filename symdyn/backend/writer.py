@@ -18,6 +18,7 @@ from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
 GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p",
           SEED: "change"}
+PROLOGUE = "constants: everything that depends on parameters only"
 # Operations that may stop a function.
 STOPPING = ("call", "guard")
 _INLINE_LENGTH = 72
@@ -34,7 +35,7 @@ class Writer:
     """
 
     def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
-                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node],
+                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int | str], late: set[Node],
                  inlined: frozenset[Node] | None = None) -> None:
         self.dialect = dialect
         self.inlined = inlined
@@ -62,7 +63,7 @@ class Writer:
         self.checks = checks
         self._count(body, entries)
         # Only what the sines and cosines need is read before them; anything else would wait in registers, or be spilled.
-        at_once = self._at_once(body)
+        at_once = taken_at_once(body, self.dialect)
         needed = set(reachable(at_once)).difference(at_once)
         before = [n for n in body if n in needed]
         loads = self._read([*before, *at_once])
@@ -100,7 +101,7 @@ class Writer:
                     self._load(core, loads)
         sections = self._statements(body)
         results = self.results_of(tuple(constants))()
-        return Function("prologue", "constants: everything that depends on parameters only", (len(constants),),
+        return Function("prologue", PROLOGUE, (len(constants),),
                         tuple(g for g in ("p",) if g in self.groups), tuple(loads), tuple(sections), results,
                         count_of(body), 0)
 
@@ -149,18 +150,6 @@ class Writer:
 
     # -- sines and cosines
 
-    def _at_once(self, body: Sequence[Node]) -> list[Node]:
-        """The sines and cosines that need no other one, if the dialect takes so many of them all at once."""
-        chosen: list[Node] = []
-        waiting: set[Node] = set()
-        for node in body:
-            if not waiting.isdisjoint(cores_of(node.args)):
-                waiting.add(node)
-            elif node.op in ("sin", "cos"):
-                chosen.append(node)
-                waiting.add(node)
-        return chosen if self.dialect.sincos is not None and len(chosen) >= self.dialect.sincos.least else []
-
     def _sines_and_cosines(self, nodes: Sequence[Node]) -> list[Section]:
         """The section that takes these all at once."""
         way = self.dialect.sincos
@@ -188,21 +177,25 @@ class Writer:
             nodes = list(group)
             lines = self._read(nodes)
             for node in nodes:
-                if node.op == "call":
-                    lines += self._call(node)
-                    continue
-                if node.op == "guard":
-                    lines.append(self._guard(node))
-                    continue
-                value = self.printer.operation(node)
-                if self._written_where_used(node, value):
-                    self.text[node] = value
-                    self.printer.inline.add(node)
-                else:
-                    self._assign(node, self._name(node), value, lines)
+                lines += self.step(node)
             if lines:
                 sections.append(Section(title, tuple(lines)))
         return sections
+
+    def step(self, node: Node) -> list[str]:
+        """The statements of a step, if it is not written where it is used."""
+        if node.op == "call":
+            return self._call(node)
+        if node.op == "guard":
+            return [self._guard(node)]
+        value = self.printer.operation(node)
+        if self._written_where_used(node, value):
+            self.text[node] = value
+            self.printer.inline.add(node)
+            return []
+        lines: list[str] = []
+        self._assign(node, self._name(node), value, lines)
+        return lines
 
     def _written_where_used(self, node: Node, value: str) -> bool:
         """Whether a step gets no variable."""
@@ -245,6 +238,19 @@ class Writer:
             return f"{node.op}_{first.args[1]}"
         self.n_unnamed += 1
         return f"x{self.n_unnamed}"
+
+
+def taken_at_once(body: Sequence[Node], dialect: Dialect) -> list[Node]:
+    """The sines and cosines that need no other one, if the dialect takes so many of them all at once."""
+    chosen: list[Node] = []
+    waiting: set[Node] = set()
+    for node in body:
+        if not waiting.isdisjoint(cores_of(node.args)):
+            waiting.add(node)
+        elif node.op in ("sin", "cos"):
+            chosen.append(node)
+            waiting.add(node)
+    return chosen if dialect.sincos is not None and len(chosen) >= dialect.sincos.least else []
 
 
 def checks_of(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:

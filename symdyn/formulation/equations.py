@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from symdyn.analytic.units import UnitReport
     from symdyn.exact.mechanism import Proofs
     from symdyn.formulation.identification.quantities import BaseParameters
-    from symdyn.given import Numbers, PathName
+    from symdyn.given import Numbers, PathName, Rolling
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
     from symdyn.sympy_mechanics.back import SympyEquations
@@ -328,14 +328,17 @@ class Equations:
         return self.compile(backend="numpy").function(name)
 
     def compile(self, backend: str | None = None, templates: str | os.PathLike[str] | None = None,
-                specialize: Numbers | None = None) -> Module:
+                specialize: Numbers | None = None, rolled: Rolling = "auto") -> Module:
         """A numeric module.
 
         backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
         templates    folder whose templates take precedence
         specialize   parameters, by symbol or name, that become numbers in the code and are folded
+        rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False;
+                     `module.report` says which
 
-        Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
+        Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code, SymdynError for
+        loops with the backend "numpy", which has none.
 
         >>> equations = sd.systems.pendulum().embedding()
         >>> equations.compile(backend="numpy").name
@@ -343,7 +346,7 @@ class Equations:
         """
         from symdyn.pipeline import compile_equations
 
-        return compile_equations(self, backend, templates, specialize)
+        return compile_equations(self, backend, templates, specialize, rolled)
 
     def write(self, folder: str | os.PathLike[str], backend: str = "c", functions: Sequence[str] | None = None,
               templates: str | os.PathLike[str] | None = None, specialize: Numbers | None = None,

@@ -45,7 +45,19 @@ if TYPE_CHECKING:
     from symdyn.formulation.printed.independent_speeds import MotionEquations
     from symdyn.formulation.trees.embedding import EmbeddedEquations
     from symdyn.formulation.trees.recursive import RecursiveEquations
-    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, MechanicsPoint, Named, Numbers, Scalar, Values, Vector
+    from symdyn.given import (
+        BodyOrName,
+        Frame,
+        Inertia,
+        JointOrName,
+        MechanicsPoint,
+        Named,
+        Numbers,
+        Rolling,
+        Scalar,
+        Values,
+        Vector,
+    )
     from symdyn.model.shapes import Shape
     from symdyn.runtime.module import Module
     from symdyn.viewer import View
@@ -628,20 +640,21 @@ class System:
         return choose(self.check(), tune)
 
     def compile(self, backend: str | None = None, tune: bool = False, templates: str | os.PathLike[str] | None = None,
-                specialize: Numbers | None = None) -> Module:
+                specialize: Numbers | None = None, rolled: Rolling = "auto") -> Module:
         """A numeric module of `equations(tune)`.
 
         backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
         templates    folder whose templates take precedence
         specialize   parameters, by symbol or name, that become numbers in the code and are folded
+        rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False
 
         Raises what `equations` raises, CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects
-        the code.
+        the code, SymdynError for loops with the backend "numpy", which has none.
 
         >>> sd.systems.pendulum().compile(backend="numpy").rhs(0.0, [0.1, 0.0]).round(6)
         array([ 0.      , -0.979366])
         """
-        return self.equations(tune).compile(backend, templates, specialize)
+        return self.equations(tune).compile(backend, templates, specialize, rolled)
 
     def show(self, path: str | Path | None = None, params: Numbers | None = None, q: Values | None = None) -> View:
         """The mechanism to look at before anything is simulated: a page that turns and zooms, with a slider for every coordinate,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from symdyn.backend.source import Source
 from symdyn.choice import HEADING, Candidate
+from symdyn.counting import counted
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.tape.tape import Tape
@@ -30,10 +32,28 @@ class Row:
 
 
 @dataclass(frozen=True)
+class RolledRow:
+    """Loops in the code of one function: how many, their trips together, and statements: those that are written, those that run;
+    size: bytes of the whole code."""
+
+    function: str
+    loops: int
+    trips: int
+    written: int
+    statements: int
+    size: int
+
+    def __str__(self) -> str:
+        return (f"{self.function}: {counted(self.loops, 'loop')} of {self.trips} trips in all; {self.written} statements are "
+                f"written in place of {self.statements}; {self.size} bytes of code with all other functions")
+
+
+@dataclass(frozen=True)
 class Report:
     """Report of what was generated, what was skipped and why; prints as text.
 
-    many   how many states and motions are computed at once
+    many    how many states and motions are computed at once
+    rolled  functions of the right-hand side's code whose repeated statements are loops
     """
 
     title: str
@@ -44,6 +64,7 @@ class Report:
     skipped: tuple[str, ...]
     candidates: tuple[Candidate, ...] = ()
     many: str = ""
+    rolled: tuple[RolledRow, ...] = ()
 
     def __str__(self) -> str:
         lines = [self.title, f"  backend {self.backend}" + (f": {self.fallback}" if self.fallback else "")]
@@ -56,6 +77,9 @@ class Report:
             lines.append(f"  {r.function:20}{r.total:>11}{kinds[0]:>7}{kinds[1]:>7}{kinds[2]:>5}{kinds[3]:>6}{other:>7}"
                          f"{r.prologue:>10}{r.chain:>15}")
         lines.append("  Every function is generated when it is first used, with nothing in it that it does not need.")
+        if self.rolled:
+            lines.append("  Rolled, as like parts repeat the same statements:")
+            lines += [f"    {row}" for row in self.rolled]
         if self.many:
             lines.append(f"  Many at once: {self.many}")
         if self.candidates:
@@ -73,8 +97,19 @@ def _row(name: str, tape: Tape) -> Row:
     return Row(name, tape.count(), sum(tape.count_prologue().values()), tape.longest_chain())
 
 
-def report(equations: Equations, backend: str, fallback: str = "") -> Report:
-    """The report of equations on a backend; counts after hoisting, one each for + - * / sqrt sin cos."""
+def rolled_rows(source: Source) -> tuple[RolledRow, ...]:
+    """The functions of a source with loops."""
+    size = sum(len(text) for text in source.files.values())
+    program = source.program
+    ways = [way for f in (program.prologue, *program.functions) for way in (f, f.regular, f.otherwise) if way is not None]
+    return tuple(RolledRow(f.name, len(f.loops), sum(f.loops), f.written, f.steps, size) for f in ways if f.loops)
+
+
+def report(equations: Equations, backend: str, fallback: str = "", source: Source | None = None) -> Report:
+    """The report of equations on a backend; counts after hoisting, one each for + - * / sqrt sin cos.
+
+    source   of the right-hand side
+    """
     from symdyn.functions.table import STANDARD
     from symdyn.functions.tapes import function_tape, has_function
 
@@ -90,4 +125,4 @@ def report(equations: Equations, backend: str, fallback: str = "") -> Report:
     if equations.constraints:
         sizes["constraints"] = len(equations.constraints)
     return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
-                  tuple(skipped(equations)), equations.candidates)
+                  tuple(skipped(equations)), equations.candidates, rolled=rolled_rows(source) if source is not None else ())

@@ -204,6 +204,10 @@ def test_file_that_the_dialect_names_is_missing(derived: Callable[..., Any], fol
      "sincos.sin is missing; sincos.sine is not known"),
     ("[operations]", "[sincos]\nleast = 2\ntake = '{angle}'\nsin = ''\ncos = ''\n[operations]",
      "sincos.take = '{angle}' cannot be filled in ('angle'); it may use {n}, {angles}"),
+    ("[operations]", "[loops]\nindex = 'i'\nbegin = 'for {m}'\nend = ''\ncount = 1\n[operations]",
+     "loops takes parts, which are missing; loops.carried is missing"),
+    ("[operations]", "[loops]\nindex = 'i'\nbegin = 'for {m}'\nend = ''\ncount = 1\n[operations]",
+     "loops.count is not known; loops.begin = 'for {m}' cannot be filled in ('m'); it may use {n}"),
 ])
 def test_broken_dialect(old: str, new: str, message: str, derived: Callable[..., Any], folder: Path) -> None:
     path = folder / "ecmascript" / "dialect.toml"

@@ -1,0 +1,529 @@
+"""Writes a function of many like steps as loops: what bodies that are alike repeat stands once, over arrays of what differs.
+
+The steps are taken in the order in which they are recorded, and results are stored right after they are computed; so every
+value is computed as in straight-line code, by the same operations from the same values. What a step of a loop reads is found by
+comparing all trips: the same value in all, a value of the same trip, one of the trip before, or an entry of an array, at a place
+that grows by the same number from trip to trip or, where it does not, stands in a table.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+
+from symdyn.backend.dialect import Dialect, identifier
+from symdyn.backend.divide import products_beside_their_sums
+from symdyn.backend.function import ARGUMENTS, Function, Part, Section
+from symdyn.backend.like_parts import Loop, find_loops
+from symdyn.backend.writer import Writer, cores_of, taken_at_once
+from symdyn.tape.evaluate import constant
+from symdyn.tape.node import Node
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.tape import Tape, count_of, reachable, unsigned
+
+# Steps that are not repeated: numeric algorithms and their results.
+_ALONE = ("call", "item", "sines")
+# What a step reads besides leaves and constants, which are named by their groups.
+_NUMBER, _STEP = "number", "step"
+# The arrays that these stand in; leaves and constants stand in those of their groups.
+_ARRAYS = {_STEP: "w", "sin": "w", "cos": "w"}
+# Records before the first and behind the last trip of a loop, for values of the bodies at the ends, which are computed apart.
+_SPARE = 2
+# Entries of a table that take as much time to compile as a statement.
+_ENTRIES = 4
+# Statements that are computed apart, in one function at most.
+_LONGEST = 800
+
+
+@dataclass(frozen=True, eq=False)
+class _Store:
+    """A step that keeps a value: entry k of the result ("store"), or of what sines and cosines are taken of ("angle")."""
+
+    op: str
+    k: int
+    value: Any
+    section: str = ""
+
+    @property
+    def args(self) -> tuple[Any, ...]:
+        return (self.value,)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sines:
+    """A step that takes all sines and cosines."""
+
+    op: str = "sines"
+    section: str = "sines and cosines"
+    args: tuple[Any, ...] = ()
+
+
+_Step = Node | _Store | _Sines
+
+
+@dataclass(frozen=True)
+class _Kept(Mapping[Node, tuple[str, int]]):
+    """What is read from arrays by steps that are computed apart: constants, sines, and steps before the first of these."""
+
+    of: Rolled
+    first: int
+
+    def __getitem__(self, node: Node) -> tuple[str, int]:
+        rolled = self.of
+        if node in rolled.stored:
+            return rolled.stored[node]
+        k = rolled.number.get(node, -1)
+        if k < 0 or rolled.groups[k] not in _ARRAYS or rolled.place[k] < 0 or self.first <= k < len(rolled.steps):
+            raise KeyError(node)
+        return "w", int(rolled.place[k])
+
+    def __iter__(self) -> Iterator[Node]:
+        raise NotImplementedError
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class _Argument:
+    """An argument of a step of a loop.
+
+    kind     "same": one value in all trips; "own": step `step` of the same trip; "before": that of the trip before, in the first
+             trip `numbers[0]`; "array": at places of `group`; "table": numbers that differ
+    numbers  of what is read in each trip, see Rolled.read
+    """
+
+    kind: str
+    group: str
+    numbers: np.ndarray
+    step: int = -1
+
+
+class Rolled:
+    """The steps of a function, and which of them are loops.
+
+    stored   nodes that are read from an array: what the prologue computed -> (group, place)
+    checks   of the whole function
+    inlined  what is written where it is used; None: what is used once and short
+    read     what steps read: the steps, then all else; number: step or node -> its place there
+    groups   of each of these; place: where it stands in the array of its group, -1: nowhere
+    """
+
+    def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
+                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int | str], checks: Mapping[Node, str],
+                 body: Sequence[Node], entries: Sequence[Any], inlined: frozenset[Node] | None = None) -> None:
+        assert dialect.loops is not None and dialect.parts is not None
+        self.dialect, self.tape, self.places, self.stored = dialect, tape, places, stored
+        self.codes, self.checks = codes, checks
+        self.body, self.entries, self.inlined = body, entries, inlined
+        self.at_once = taken_at_once(body, dialect)
+        self.angles = list(dict.fromkeys(n.args[0] for n in self.at_once))
+        self.steps: list[Any] = self._in_order()
+        self.number: dict[Any, int] = {step: k for k, step in enumerate(self.steps)}
+        self.read: list[Any] = list(self.steps)
+        self.groups: list[str] = [_STEP] * len(self.steps)
+        kinds = self._look()
+        begins = [k for k in range(1, len(self.steps)) if self.steps[k].section != self.steps[k - 1].section]
+        self.loops = find_loops(kinds, begins)
+        self.size = self._find_places()
+
+    @property
+    def written(self) -> int:
+        """Steps that are written: those of one trip of each loop, and all others."""
+        return len(self.steps) - sum(loop.saved for loop in self.loops)
+
+    @property
+    def saved(self) -> int:
+        """Statements that loops save, less what their tables take."""
+        tables = {a.numbers.tobytes(): len(a.numbers) for a in self.arguments.values() if a.kind == "table" or
+                  (a.kind == "array" and len(set(np.diff(self.place[a.numbers]).tolist())) > 1)}
+        return sum(loop.saved for loop in self.loops) - sum(tables.values()) // _ENTRIES
+
+    def _in_order(self) -> list[_Step]:
+        """The steps: what sines and cosines need, these, then the rest; each result is stored as soon as it is there."""
+        computed = set(self.body).difference(self.at_once)
+        stores: dict[Node, list[_Step]] = {}
+        first: list[_Step] = []
+        for k, entry in enumerate(self.entries):
+            core = unsigned(entry)
+            here = stores.setdefault(core, []) if isinstance(core, Node) and core in computed else first
+            here.append(_Store("store", k, entry))
+        needed = computed.intersection(reachable(self.angles))
+        ordered = [n for n in products_beside_their_sums(self.body, self.entries) if n in computed]
+
+        def stored(nodes: Sequence[Node]) -> Iterator[_Step]:
+            for node in nodes:
+                yield node
+                yield from stores.get(node, ())
+
+        taken: list[_Step] = [_Store("angle", k, angle) for k, angle in enumerate(self.angles)]
+        return [*stored([n for n in ordered if n in needed]), *taken, *[_Sines()] * bool(taken), *first,
+                *stored([n for n in ordered if n not in needed])]
+
+    # -- what steps do, and what they read
+
+    def _look(self) -> np.ndarray:
+        """Number what the steps read; returns the kinds of steps."""
+        order = {angle: k for k, angle in enumerate(self.angles)}
+        n = len(self.angles)
+        sines = {node: (1 + (node.op == "cos")) * n + order[node.args[0]] for node in self.at_once}
+        place = [-1] * len(self.steps)
+        kinds: dict[tuple[Any, ...], int] = {}
+        found = np.empty(len(self.steps), dtype=np.int64)
+        references = []
+        names = self.tape.recorder.names
+        for k, step in enumerate(self.steps):
+            signature: list[Any] = [step.op, *((step in self.checks, step in names) if isinstance(step, Node) else ())]
+            row = [-1, -1, -1]
+            if step.op in _ALONE:
+                signature.append(k)
+            else:
+                for j, a in enumerate(step.args):
+                    core = unsigned(a)
+                    key = core if isinstance(core, Node) else (type(core), core)
+                    number = self.number.get(key)
+                    if number is None:
+                        number = self.number[key] = len(self.read)
+                        group, at = self._group(core, sines)
+                        self.read.append(core)
+                        self.groups.append(group)
+                        place.append(at)
+                    row[j] = number
+                    signature += (core is not a, self.groups[number])
+            references.append(row)
+            found[k] = kinds.setdefault(tuple(signature), len(kinds))
+        self.references = np.array(references, dtype=np.int64).reshape(-1, 3)
+        self.place = np.array(place, dtype=np.int64)
+        return found
+
+    def _group(self, core: Any, sines: Mapping[Node, int]) -> tuple[str, int]:
+        """The array that a value is read from, if it is not a step, and its place there."""
+        if isinstance(core, Node):
+            if core.op == "leaf":
+                return self.places[core.args[1]]
+            if core in self.stored:
+                return self.stored[core]
+            if core in sines:
+                return core.op, sines[core]
+        return _NUMBER, -1
+
+    def _argument(self, loop: Loop, r: int, j: int) -> _Argument:
+        """Argument j of step r of a loop."""
+        numbers = self.references[loop.begin + r:loop.end:loop.length, j]
+        group = self.groups[numbers[0]]
+        if (numbers == numbers[0]).all() and not loop.begin <= numbers[0] < loop.end:
+            return _Argument("same", group, numbers)
+        if group == _NUMBER:
+            return _Argument("table", group, numbers)
+        if group == _STEP:
+            own = numbers - loop.begin - loop.length * np.arange(loop.trips)
+            if (own == own[0]).all() and own[0] >= 0:
+                return _Argument("own", group, numbers, int(own[0]))
+            if (own[1:] == own[1]).all() and -loop.length <= own[1] < 0:
+                return _Argument("before", group, numbers, int(own[1]) + loop.length)
+        return _Argument("array", group, numbers)
+
+    # -- places of what is kept
+
+    def _arguments(self) -> dict[tuple[int, int, int], _Argument]:
+        """(loop, step, argument) -> what it is."""
+        return {(k, r, j): self._argument(loop, r, j) for k, loop in enumerate(self.loops) for r in range(loop.length)
+                for j in range(len(self.steps[loop.begin + r].args))}
+
+    def _find_places(self) -> int:
+        """Places in w for what is read in another stretch or by an array; returns the size of w."""
+        self.arguments = self._arguments()
+        self.apart = list(self._apart())
+        needed = np.zeros(len(self.read), dtype=bool)
+        for a in self.arguments.values():
+            needed[a.numbers[:1] if a.kind in ("same", "before") else a.numbers[:0] if a.kind in ("own", "table") else
+                   a.numbers] = True
+        for first, end in self.apart:
+            for step in self.steps[first:end]:
+                for core in cores_of(step.args):
+                    k = self.number.get(core, -1)
+                    if 0 <= k < first:
+                        needed[k] = True
+        needed = needed[:len(self.steps)]
+        size = 3 * len(self.angles)
+        spare: set[int] = set()
+        for loop in self.loops:
+            read = needed[loop.begin:loop.end].reshape(loop.trips, loop.length)
+            fields = np.flatnonzero(read[:-1].any(axis=0))
+            last = np.flatnonzero(read[-1] & ~read[:-1].any(axis=0))
+            records = size + len(fields) * np.arange(loop.trips + 2 * _SPARE)
+            for f, r in enumerate(fields):
+                self.place[loop.begin + r:loop.end:loop.length] = records[_SPARE:-_SPARE] + f
+                spare.update(int(k) + f for k in (*records[:_SPARE], *records[-_SPARE:]))
+            size += len(fields) * (loop.trips + 2 * _SPARE)
+            # What is read after the last trip only is overwritten by each.
+            for r in last:
+                self.place[loop.begin + r:loop.end:loop.length] = size
+                size += 1
+        self._continue_arrays(needed, spare)
+        rest = np.flatnonzero(needed & (self.place[:len(self.steps)] < 0))
+        self.place[rest] = size + np.arange(len(rest))
+        return size + len(rest)
+
+    def _continue_arrays(self, needed: np.ndarray, spare: set[int]) -> None:
+        """Give steps that are computed apart the places next to a loop's where another loop reads them in a row with these."""
+        for a in self.arguments.values():
+            if a.kind != "array" or a.group != _STEP:
+                continue
+            places = self.place[a.numbers]
+            known = np.flatnonzero(places >= 0)
+            if len(known) < 2 or len(known) == len(places):
+                continue
+            stride, rest = divmod(int(places[known[-1]] - places[known[0]]), int(known[-1] - known[0]))
+            row = places[known[0]] + stride * (np.arange(len(places)) - known[0])
+            missing = np.flatnonzero(places < 0)
+            if rest == 0 and (row[known] == places[known]).all() and all(int(row[k]) in spare for k in missing):
+                self.place[a.numbers[missing]] = row[missing]
+                spare.difference_update(int(row[k]) for k in missing)
+
+
+    def _apart(self) -> Iterator[tuple[int, int]]:
+        """Stretches that are no loops, from a step to another; sines and cosines are one of their own."""
+        for before, loop in zip([Loop(0, 0, 0), *self.loops], [*self.loops, Loop(len(self.steps), 0, 0)], strict=True):
+            begin = before.end
+            for k in range(before.end, loop.begin):
+                sines = isinstance(self.steps[k], _Sines) or isinstance(self.steps[max(k - 1, 0)], _Sines)
+                if k > begin and (sines or (k - begin >= _LONGEST and self.steps[k].op != "item")):
+                    yield begin, k
+                    begin = k
+            if loop.begin > begin:
+                yield begin, loop.begin
+
+    # -- text
+
+    def function(self, name: str, title: str, shape: tuple[int, ...], longest_chain: int) -> Function:
+        """The function in parts, each a loop or a stretch of steps that are computed apart."""
+        inlined: set[Node] = set()
+        at = {loop.begin: k for k, loop in enumerate(self.loops)}
+        stretches = sorted([*self.apart, *((loop.begin, loop.end) for loop in self.loops)])
+        parts = [_LoopWriter(self, at[first]).part(inlined) if first in at else self._stretch(first, end, inlined)
+                 for first, end in stretches]
+        groups = {g for part in parts for g in part.arguments}
+        return Function(name, title, shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), count_of(self.body),
+                        longest_chain, tuple(parts), self.size, inlined=frozenset(inlined), written=self.written,
+                        steps=len(self.steps))
+
+    def _stretch(self, first: int, end: int, inlined: set[Node]) -> Part:
+        """Steps that are computed apart."""
+        assert self.dialect.parts is not None and self.dialect.loops is not None
+        steps = self.steps[first:end]
+        if isinstance(steps[0], _Sines):
+            n = len(self.angles)
+            take = self.dialect.loops.sines.format(n=n, sines=n, cosines=2 * n)
+            return Part((), (), (Section(steps[0].section, (take,)),), (), False)
+        writer = Writer(replace(self.dialect, sincos=None), self.tape, self.places, _Kept(self, first), self.codes, set(),
+                        self.inlined)
+        nodes = [step for step in steps if isinstance(step, Node)]
+        stores = [step for step in steps if isinstance(step, _Store)]
+        kept = [node for node in nodes if self.place[self.number[node]] >= 0]
+
+        def results() -> tuple[str, ...]:
+            lines = [self.stored_at("w", str(self.place[self.number[node]]), writer.printer.text(node)) for node in kept]
+            return (*lines, *(self.stored_at(s.op, str(s.k), writer.printer.text(s.value)) for s in stores))
+
+        part = writer.part(nodes, [*kept, *(s.value for s in stores)], results, self.checks)
+        within = set(nodes)
+        uses = {core for node in nodes for core in cores_of(node.args)} & within
+        inlined |= writer.printer.inline & uses
+        return replace(part, stores=any(s.op == "store" for s in stores))
+
+    def stored_at(self, what: str, place: str, text: str) -> str:
+        """The statement that keeps a value at a place."""
+        assert self.dialect.parts is not None
+        return (self.dialect.store if what == "store" else self.dialect.parts.store).format(k=place, value=text)
+
+
+class _LoopWriter:
+    """Writes a loop: the steps of a trip, on nodes of their own, whose leaves are what they read from outside of it."""
+
+    def __init__(self, rolled: Rolled, k: int) -> None:
+        assert rolled.dialect.loops is not None
+        self.rolled, self.k, self.loop, self.words = rolled, k, rolled.loops[k], rolled.dialect.loops
+        self.names = rolled.tape.recorder.names
+        self.writer = Writer(replace(rolled.dialect, sincos=None), rolled.tape, rolled.places, {}, {}, set())
+        self.writer.taken.add(self.words.index)
+        self.writer.names = {}
+        self.recorder = Recorder()
+        self.nodes: dict[int, Node] = {}
+        self.before: list[str] = []
+        self.after: list[str] = []
+        self.n_tables = 0
+        self.outside: dict[tuple[Any, ...], Any] = {}
+        self.loads: dict[Node, str] = {}
+
+    def part(self, inlined: set[Node]) -> Part:
+        """The loop as a function; adds what is written where it is used."""
+        rolled, loop, writer = self.rolled, self.loop, self.writer
+        steps = rolled.steps[loop.begin:loop.begin + loop.length]
+        values = [self._repeated(r, step) for r, step in enumerate(steps)]
+        kept = [r for r, step in enumerate(steps) if isinstance(step, Node) and rolled.place[loop.begin + r] >= 0]
+        used = Counter(core for args in values for core in cores_of(args))
+        within = {core for args, step in zip(values, steps, strict=True) if isinstance(step, Node) for core in cores_of(args)}
+        carried = {key[1]: leaf for key, leaf in self.outside.items() if key[0] == "before"}
+        used.update(self.nodes[r] for r in kept)
+        # What the next trip reads needs a variable: what it replaces may be read until the end of the trip.
+        for r in carried:
+            used[self.nodes[r]] += 2
+        if rolled.inlined is not None:
+            writer.inlined = frozenset(node for r, node in self.nodes.items() if rolled.steps[loop.begin + r] in rolled.inlined)
+        writer.uses = used
+        writer.guarded = {node.args[0] for node in self.nodes.values() if node.op == "guard"}
+        writer.results = {self.nodes[r] for r in kept} | {
+            core for args, step in zip(values, steps, strict=True) if isinstance(step, _Store) for core in cores_of(args)}
+        lines: list[str] = []
+        heading = ""
+        for r, (step, args) in enumerate(zip(steps, values, strict=True)):
+            here = [line for core in cores_of(args) for line in self._load(core)]
+            if isinstance(step, _Store):
+                numbers = np.array([s.k for s in rolled.steps[loop.begin + r:loop.end:loop.length]])
+                here.append(rolled.stored_at(step.op, self._index(numbers), writer.printer.text(args[0])))
+            else:
+                here += self._step(r, r in carried)
+                if self.nodes[r] in within and self.nodes[r] in writer.printer.inline:
+                    inlined.update(rolled.steps[loop.begin + r:loop.end:loop.length])
+            if here and step.section and step.section != heading:
+                heading = step.section
+                title = _in_words(heading, rolled.steps[loop.begin + loop.length + r].section, self.words.index)
+                lines.append(f"{rolled.dialect.comment} {title}")
+            lines += here
+        lines += [self.words.assign.format(name=writer.text[leaf], value=writer.printer.text(self.nodes[r]))
+                  for (kind, r, *_), leaf in self.outside.items() if kind == "before"]
+        body = [f"    {line}" for line in lines]
+        section = Section("", (self.words.begin.format(n=loop.trips), *body, self.words.end, *self.after))
+        return Part(tuple(g for g in ARGUMENTS if g in writer.groups), tuple(self.before), (section,), (),
+                    any(isinstance(s, _Store) and s.op == "store" for s in steps), loop.trips)
+
+    def _step(self, r: int, carried: bool) -> list[str]:
+        """The statements of a step that computes something; what is read after the last trip only is kept after it."""
+        rolled, loop, node = self.rolled, self.loop, self.nodes[r]
+        lines = self.writer.step(node)
+        places = rolled.place[loop.begin + r:loop.end:loop.length]
+        if places[0] < 0:
+            return lines
+        line = rolled.stored_at("w", self._index(places), self.writer.printer.text(node))
+        if carried and places[0] == places[1]:
+            before = next(leaf for key, leaf in self.outside.items() if key[:2] == ("before", r))
+            self.after.append(rolled.stored_at("w", str(places[0]), self.writer.text[before]))
+            return lines
+        return [*lines, line]
+
+    def _repeated(self, r: int, step: Any) -> tuple[Any, ...]:
+        """The arguments of a step in terms of the trip; makes its node."""
+        args = []
+        for j, a in enumerate(step.args):
+            value = self._value(self.rolled.arguments[self.k, r, j], a)
+            args.append(Node(self.recorder, "neg", (value,), 0, value.mask, "") if unsigned(a) is not a else value)
+        if isinstance(step, Node):
+            node = self.nodes[r] = Node(self.recorder, step.op, tuple(args), r, step.mask, "")
+            others = self.rolled.steps[self.loop.begin + r:self.loop.end:self.loop.length]
+            if step in self.names:
+                self.writer.names[node] = _in_words(self.names[others[1]], self.names[others[2]], self.words.index)
+            if step in self.rolled.checks:
+                codes = np.array([self.rolled.codes[self.rolled.checks[other]] for other in others])
+                key = self._index(codes)
+                self.writer.checks = {**self.writer.checks, node: key}
+                self.writer.codes = {**self.writer.codes, key: key}
+        return tuple(args)
+
+    def _value(self, argument: _Argument, value: Any) -> Any:
+        """An argument: a number, a node of the trip, or a leaf that stands for what is read."""
+        if argument.kind == "own":
+            return self.nodes[argument.step]
+        if argument.kind == "same" and argument.group == _NUMBER:
+            return unsigned(value)
+        if argument.kind == "before":
+            key: tuple[Any, ...] = ("before", argument.step, int(argument.numbers[0]))
+        elif argument.kind == "same":
+            key = ("same", int(argument.numbers[0]))
+        else:
+            key = (argument.kind, argument.numbers.tobytes())
+        leaf = self.outside.get(key)
+        if leaf is None:
+            leaf = self.outside[key] = self._leaf(argument, argument.kind == "before")
+        return leaf
+
+    def _leaf(self, argument: _Argument, carried: bool) -> Node:
+        """A leaf for what is read from outside of the trip, and how it is read."""
+        rolled, writer = self.rolled, self.writer
+        cores = [rolled.read[k] for k in argument.numbers[[0, 0] if argument.kind == "same" else [1, 2]]]
+        array = "table" if argument.kind == "table" else _ARRAYS.get(argument.group, argument.group)
+        unnamed = "x" if carried else f"{array}{len(self.outside) + 1}"
+        name = _in_words(self._name(cores[0]), self._name(cores[1]), self.words.index) or unnamed
+        leaf = Node(self.recorder, "leaf", (0, name), 0, max(1, *(getattr(core, "mask", 1) for core in cores)), "")
+        if array == "t":
+            writer.groups.add("t")
+            writer.text[leaf] = "t"
+            return leaf
+        if argument.kind == "table":
+            value = self._table(self.words.numbers, [repr(constant(core)) for core in (rolled.read[k] for k in argument.numbers)])
+        else:
+            numbers = argument.numbers[:1] if argument.kind in ("same", "before") else argument.numbers
+            load = rolled.dialect.load.get(array, rolled.dialect.parts.load if rolled.dialect.parts is not None else "")
+            value = load.format(k=self._index(rolled.place[numbers]))
+            if array != "w":
+                writer.groups.add(array)
+        if carried:
+            writer.text[leaf] = identifier(f"{name}_before", writer.taken)
+            self.before.append(self.words.carried.format(name=writer.text[leaf], value=value))
+        elif argument.kind == "same":
+            writer.text[leaf] = identifier(name, writer.taken)
+            self.before.append(rolled.dialect.assign.format(name=writer.text[leaf], value=value))
+        else:
+            self.loads[leaf] = value
+        return leaf
+
+    def _load(self, core: Node) -> list[str]:
+        """The statement that reads what a step needs for the first time."""
+        value = self.loads.pop(core, None)
+        if value is None:
+            return []
+        self.writer.text[core] = identifier(core.args[1], self.writer.taken)
+        return [self.rolled.dialect.assign.format(name=self.writer.text[core], value=value)]
+
+    def _name(self, core: Any) -> str:
+        """The name of what is read, if it has one."""
+        if not isinstance(core, Node):
+            return ""
+        if core.op == "leaf":
+            return str(core.args[1])
+        inner = core.args[0] if core.op in ("sin", "cos") else None
+        of = f"{core.op}_{inner.args[1]}" if isinstance(inner, Node) and inner.op == "leaf" else ""
+        return self.names.get(core, of)
+
+    def _index(self, numbers: np.ndarray) -> str:
+        """The place in an array, trip after trip: as it grows, or from a table."""
+        begin, i = int(numbers[0]) + self.rolled.dialect.first, self.words.index
+        stride = int(numbers[1] - numbers[0]) if len(numbers) > 1 else 0
+        if not (np.diff(numbers) == stride).all():
+            return self._table(self.words.integers, [str(k + self.rolled.dialect.first) for k in numbers.tolist()])
+        if stride == 0:
+            return str(begin)
+        grown = i if abs(stride) == 1 else f"{abs(stride)}*{i}"
+        return f"{begin} - {grown}" if stride < 0 else f"{begin} + {grown}" if begin else grown
+
+    def _table(self, form: str, values: Sequence[str]) -> str:
+        """A table with an entry for each trip; what reads it."""
+        self.n_tables += 1
+        name = identifier(f"table{self.n_tables}", self.writer.taken)
+        written = fill(", ".join(values), 116, subsequent_indent="    ", break_long_words=False)
+        self.before.insert(0, form.format(name=name, values=written))
+        return self.words.item.format(name=name)
+
+
+def _in_words(first: str, second: str, index: str) -> str:
+    """A name for two that differ in numbers: with the index in place of these."""
+    one, other = re.split(r"(\d+)", first), re.split(r"(\d+)", second)
+    if len(one) != len(other) or one[::2] != other[::2]:
+        return re.sub(r"\d+", index, first)
+    return "".join(a if a == b else index for a, b in zip(one, other, strict=True))
