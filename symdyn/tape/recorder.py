@@ -40,6 +40,7 @@ class Recorder:
     checks   node -> reason: values that must be positive, such as pivots of the mass matrix
     slopes   node -> pairs (derivative, by which value): derivatives that are known to be shorter than those by the chain rule,
              which the steps do not tell, such as those of the potential of what is at rest; for proofs
+    balanced   the outputs that were balanced last, and the tape that they became, see symdyn.tape.balance
     """
 
     def __init__(self) -> None:
@@ -49,6 +50,7 @@ class Recorder:
         self.names: dict[Node, str] = {}
         self.checks: dict[Node, str] = {}
         self.slopes: dict[Node, tuple[tuple[Any, Any], ...]] = {}
+        self.balanced: tuple[Any, Any] | None = None
 
     # -- leaves, names, sections
 

@@ -51,3 +51,17 @@ def test_named_checked_and_shared_sums_stay() -> None:
     ours = balance(Tape.of(r, y=[named + c, d / checked, checked + d, shared + a, shared + c]))
     assert list(ours.recorder.names.values()) == ["kept"] and list(ours.recorder.checks.values()) == ["why"]
     assert ours.operations == 11
+
+
+def test_what_was_balanced_last_is_handed_out_once_more() -> None:
+    """The tape that a formulation is chosen by is the one that is emitted; a name or a check in between makes another one."""
+    r = Recorder()
+    a, b, c = (r.leaf(name, kinds.COORDINATE) for name in "abc")
+    total = r.sin(a) + b + c
+    tape = Tape.of(r, y=[total])
+    first = balance(tape)
+    assert balance(Tape.of(r, y=[total])) is first
+    assert balance(tape) is not first
+    r.name("sum", total)
+    assert list(balance(tape).recorder.names.values()) == ["sum"]
+    assert balance(Tape.of(r, y=[total, a])).operations == balance(Tape.of(r, y=[total])).operations == 3

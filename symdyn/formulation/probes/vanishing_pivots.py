@@ -63,8 +63,8 @@ def _filled(tree: Tree, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where the mass (1,), the first moment (3,) and the inertia (3, 3) of a link's own are not zero."""
     inertia = tree.links[k].inertia
     whole = np.array([inertia.m, *inertia.h, *inertia.I.ravel()], dtype=object)
-    nodes = Tape.of(Recorder(), whole=whole)
-    if tree.idle.isdisjoint(leaf.args[1] for leaf in nodes.inputs):
+    # The inertia of a link may hold masses of all links behind it: what it depends on is found only where it matters.
+    if not tree.idle or tree.idle.isdisjoint(leaf.args[1] for leaf in Tape.of(Recorder(), whole=whole).inputs):
         filled = np.array([not is_zero(e) for e in whole])
     else:
         filled = abs(_Position(tree, 0, False).numbers(whole)[0]) > math.sqrt(NOTHING)
