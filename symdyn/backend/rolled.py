@@ -181,21 +181,24 @@ class Rolled:
         for k, step in enumerate(self.steps):
             signature: list[Any] = [step.op, *((step in self.checks, step in names) if isinstance(step, Node) else ())]
             row = [-1, -1, -1]
-            if step.op in _ALONE:
-                signature.append(k)
-            else:
-                for j, a in enumerate(step.args):
-                    core = unsigned(a)
-                    key = core if isinstance(core, Node) else (type(core), core)
-                    number = self.number.get(key)
-                    if number is None:
-                        number = self.number[key] = len(self.read)
-                        group, at = self._group(core, sines)
-                        self.read.append(core)
-                        self.groups.append(group)
-                        place.append(at)
+            alone = step.op in _ALONE
+            for j, a in enumerate(step.args):
+                core = unsigned(a)
+                if alone and not isinstance(core, Node):
+                    continue
+                key = core if isinstance(core, Node) else (type(core), core)
+                number = self.number.get(key)
+                if number is None:
+                    number = self.number[key] = len(self.read)
+                    group, at = self._group(core, sines)
+                    self.read.append(core)
+                    self.groups.append(group)
+                    place.append(at)
+                if not alone:
                     row[j] = number
                     signature += (core is not a, self.groups[number])
+            if alone:
+                signature.append(k)
             references.append(row)
             found[k] = kinds.setdefault(tuple(signature), len(kinds))
         self.references = np.array(references, dtype=np.int64).reshape(-1, 3)
@@ -225,7 +228,8 @@ class Rolled:
             own = numbers - loop.begin - loop.length * np.arange(loop.trips)
             if (own == own[0]).all() and own[0] >= 0:
                 return _Argument("own", group, numbers, int(own[0]))
-            if (own[1:] == own[1]).all() and -loop.length <= own[1] < 0:
+            earlier = not loop.begin <= numbers[0] < loop.end
+            if earlier and (own[1:] == own[1]).all() and -loop.length <= own[1] < 0:
                 return _Argument("before", group, numbers, int(own[1]) + loop.length)
         return _Argument("array", group, numbers)
 
