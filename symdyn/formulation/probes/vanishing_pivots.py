@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,7 +109,7 @@ class _Search:
             self.moving.append(before.union(*self.own[-1]))
         bending = [tree.drivers[k] for body in tree.flexible for k in body.speeds]
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
-        self.positions = [_Position(tree, k, solid, self.own) for k in range(POSITIONS)]
+        self.positions = [_Position(tree, k, solid, self.own, self.alive) for k in range(POSITIONS)]
 
     def lockable(self) -> dict[int, frozenset[int]]:
         sound: set[int] = set()
@@ -151,10 +151,14 @@ class _Search:
 
 class _Position:
     """A tree at random values of everything that it depends on, the same ones of parameters at all positions; links are evaluated
-    when they are first asked for."""
+    when they are first asked for.
 
-    def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = ()) -> None:
-        self.tree, self.solid, self.own = tree, solid, own
+    alive   speeds that are still asked about, which get fewer while the links are gone through
+    """
+
+    def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = (),
+                 alive: Set[int] = frozenset()) -> None:
+        self.tree, self.solid, self.own, self.alive = tree, solid, own, alive
         self.stream = random.Random(seed)
         self.parameters = {parameter.name for parameter in tree.model.parameters}
         self.values = dict.fromkeys(tree.idle, 0.0)
@@ -177,14 +181,15 @@ class _Position:
         return float(felt @ felt), float(rest @ rest)
 
     def twists(self, k: int) -> dict[int, np.ndarray]:
-        """Velocity of link k, at its origin, link axes, (6,), by each speed that moves it."""
+        """Velocity of link k, at its origin, link axes, (6,), by each speed of its joint, and each one before that is alive."""
         if k not in self._twists:
             link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
             own = sorted(frozenset().union(*self.own[k]))
             R, r, S, D = map(_floats, self.numbers(link.R, link.r, link.S, D[:, own]))
             found = dict(zip(own, (S @ D).T, strict=True))
             before = self.twists(link.parent) if link.parent >= 0 else {}
-            for c, (*omega, x, y, z) in before.items():
+            for c in self.alive & before.keys():
+                *omega, x, y, z = before[c]
                 carried = np.concatenate([R.T @ omega, R.T @ (np.array([x, y, z]) + np.cross(omega, r))])
                 found[c] = found.get(c, 0) + carried
             self._twists[k] = found
