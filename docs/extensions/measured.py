@@ -35,6 +35,7 @@ COMMANDS = {
     "batch": "symdyn bench batch",
     "sweep": "symdyn bench sweep",
     "growth": "symdyn bench growth",
+    "rolled": "symdyn bench rolled",
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
     "optimize": "symdyn bench optimize",

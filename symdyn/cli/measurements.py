@@ -109,6 +109,12 @@ MEASUREMENTS: dict[str, Measurement] = {
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of bodies (default: 2 to 100)"}),
             _folder("growth"))),
+    "rolled": Measurement(
+        "symdyn.lab.rolled:run", "loops for what like bodies repeat, compared with straight-line code: table and picture", (
+            _names("--only", "names", "some of n_link_pendulum, spatial_chain, cable, legs"),
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of bodies (default: 10 to 1000)"}),
+            _folder("rolled"))),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),

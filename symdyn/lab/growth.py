@@ -106,7 +106,8 @@ def measure(system: System, n: int, formulations: Sequence[str]) -> list[Growth]
     rows = []
     for formulation, (equations, seconds, text), time in zip(formulations, derived, times, strict=True):
         tape = function_tape(equations, "rhs")
-        rows.append(Growth(n, formulation, tape.operations, tape.longest_chain(), seconds, len(text), _compile(text), time))
+        rows.append(Growth(n, formulation, tape.operations, tape.longest_chain(), seconds, len(text), compile_seconds(text),
+                           time))
     return rows
 
 
@@ -117,7 +118,7 @@ def measure_jacobian(system: System, n: int, formulation: str = "recursive") -> 
     operations = function_tape(equations, JACOBIAN).operations if columns is None else columns.operations(LANES)
     size = len(equations.symbols.coordinates) + len(equations.symbols.speeds)
     loop = compiled_loop(equations, name=JACOBIAN, last=size * size - 1)
-    return JacobianGrowth(n, formulation, operations, seconds, len(text), _compile(text), best_times([loop.run], 20)[0])
+    return JacobianGrowth(n, formulation, operations, seconds, len(text), compile_seconds(text), best_times([loop.run], 20)[0])
 
 
 def _derive(system: System, formulation: str, function: str = "rhs") -> tuple[Equations, float, str]:
@@ -128,7 +129,7 @@ def _derive(system: System, formulation: str, function: str = "rhs") -> tuple[Eq
     return equations, clock.perf_counter() - begun, next(iter(source.files.values()))
 
 
-def _compile(text: str) -> float:
+def compile_seconds(text: str) -> float:
     """Seconds that the compiler takes, nothing cached."""
     begun = clock.perf_counter()
     cache.discard(cache.build(f"{text}// measured at {clock.time_ns()}\n", "growth", require_compiler()))

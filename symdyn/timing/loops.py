@@ -6,7 +6,7 @@ import ctypes
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from symdyn.pipeline import emit
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.building.library import CUnit
+
+if TYPE_CHECKING:
+    from symdyn.given import Rolling
 
 # One timing takes about this long: long enough for the clock, short enough to fall between interruptions.
 TIMING_SECONDS = 2e-3
@@ -51,13 +54,14 @@ class Loop:
 
 
 def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 0, name: str = "rhs",
-                  last: int | None = None) -> Loop:
+                  last: int | None = None, rolled: Rolling = "auto") -> Loop:
     """The right-hand side at the state x (default: small numbers), parameters at their defaults, 0.5 and more without one.
 
     name   of another function whose result begins with x_dot
     last   the entry of the result that the next evaluation depends on; default: the last of x_dot
+    rolled   whether statements that are repeated become loops
     """
-    source = emit(equations, "c", (name,), standalone=False, integrator=False)
+    source = emit(equations, "c", (name,), standalone=False, integrator=False, rolled=rolled)
     metadata = source.metadata
     function = source.program.functions[0]
     sizes = metadata.sizes

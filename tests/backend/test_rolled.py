@@ -24,48 +24,12 @@ from symdyn.backend.source import Source, render
 from symdyn.errors import EvaluationError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions.content import content_of
+from symdyn.lab.rolled import cable, legs
 from symdyn.pipeline import emit, write_source
 from symdyn.runtime.building.compiler import find_compiler
 from tests.backend.c_warnings import LANGUAGE, faults_of
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
-
-
-def cable(n: int) -> sd.System:
-    """Links in space on universal joints that bend against springs and dampers."""
-    m, length, g, k, d, inertia = sd.parameters("m l g k d I")
-    system = sd.System(f"cable_{n}", gravity=[0, 0, -g])
-    about_y, about_z = sd.coordinates(f"a1:{n + 1}"), sd.coordinates(f"b1:{n + 1}")
-    parent = system.ground
-    for i, angles in enumerate(zip(about_y, about_z, strict=True)):
-        link = system.add_body(f"link{i + 1}", mass=m, inertia=[inertia / 100, inertia, inertia], com=[length / 2, 0, 0])
-        joint = system.add_joint(sd.Universal(f"joint{i + 1}", parent, link, angles, axes=([0, 1, 0], [0, 0, 1]),
-                                              parent_point=[length if i else 0, 0, 0]))
-        system.add_joint_force(joint, [-k * angle - d * angle.dot for angle in angles])
-        parent = link
-    system.defaults = {m: 0.1, length: 0.1, g: 9.81, k: 1.0, d: 0.01, inertia: 1e-4}
-    return system
-
-
-def legs(n: int) -> sd.System:
-    """A trunk on legs of three links each."""
-    g, mass, inertia = sd.parameters("g M I")
-    system = sd.System(f"legs_{n}", gravity=[0, 0, -g])
-    trunk = system.add_body("trunk", mass=mass, inertia=[inertia, 2 * inertia, 3 * inertia])
-    system.add_joint(sd.Free("float", system.ground, trunk))
-    system.defaults = {g: 9.81, mass: 10.0, inertia: 0.2}
-    for k in range(n):
-        parent, point = trunk, sd.parameters(f"x{k + 1} y{k + 1}")
-        system.defaults |= dict(zip(point, (0.3 - 0.2 * k, 0.2 + 0.1 * k), strict=True))
-        at: list[Any] = [*point, 0]
-        for j, axis in enumerate(([1, 0, 0], [0, 1, 0], [0, 1, 0])):
-            m, c, i = sd.parameters(" ".join(f"{letter}{k + 1}_{j + 1}" for letter in "mcJ"))
-            q, = sd.coordinates(f"q{k + 1}_{j + 1},")
-            link = system.add_body(f"leg{k + 1}_{j + 1}", mass=m, inertia=[i, i, i / 10], com=[0, 0, -c])
-            system.add_joint(sd.Revolute(f"joint{k + 1}_{j + 1}", parent, link, q, axis=axis, parent_point=at))
-            system.defaults |= {m: 1.0, c: 0.15, i: 0.01}
-            parent, at = link, [0, 0, -0.3]
-    return system
 
 
 def shuffled(n: int) -> sd.System:
