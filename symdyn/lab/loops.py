@@ -106,7 +106,7 @@ def measure(case: Case, repeats: int = 5, long: float | None = None) -> Row:
               largest(after.constraint_violation), largest(after.velocity_violation), long,
               (int(ranks.min()), int(ranks.max())))
     bounds = {"energy": ENERGY, "violation_q": VIOLATION, "violation_u": VIOLATION, **case.bounds}
-    stopped = () if after.success else (f"MISSED {after.message}",)
+    stopped = () if after.success else (f"MISSED {after.message.partition('; the state there')[0]}",)
     return Row(**{**asdict(row), "misses": (*_missed(row, bounds), *stopped)})
 
 
