@@ -165,12 +165,12 @@ def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tu
     if polished is not None:
         v, worth[active] = polished
         sizes = np.linalg.norm(parts.at(v)[:, 1:], axis=1)
-        by_force[active] = worth[active] / np.where(sizes[active] > 0, sizes[active], 1.0)
+        by_force[active] = worth[active] / np.maximum(sizes[active], SMALLEST)
     softness, lam = np.ones(len(null.lam_0)), null.lam_0 + null.N @ v[:n]
     for k, cone in enumerate(cones):
         softness[list(cone.tangents)] = by_force[k]
         if cone.normal is not None:
-            softness[cone.normal] = cone.friction * worth[k] / max(float(lam[cone.normal]), 1e-300)
+            softness[cone.normal] = cone.friction * worth[k] / max(float(lam[cone.normal]), SMALLEST)
     return v[:n], float(v[n]), softness
 
 

@@ -4,16 +4,21 @@ stiffness, each against a closed form."""
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from sympy import sin
 
+from symdyn.errors import SimulationWarning
 from symdyn.model.contacts import Compliance, Plane, Point
 from symdyn.model.contacts.contact import Contact
-from symdyn.model.joints import Planar, Prismatic
-from symdyn.model.symbols import coordinates, parameters
+from symdyn.model.joints import Free, Planar, Prismatic
+from symdyn.model.orientation import EulerAngles
+from symdyn.model.symbols import coordinates, parameters, time
 from symdyn.model.system import System
+from symdyn.runtime.contact_laws import SLIDING
 from symdyn.stress.record import Row, within
 
 if TYPE_CHECKING:
@@ -33,6 +38,8 @@ def contacts(short: bool) -> Iterator[Row]:
     yield _grazing()
     yield from _simultaneous()
     yield _redundant()
+    yield _table()
+    yield _lifted()
     yield from _stiffness(short)
 
 
@@ -126,6 +133,53 @@ def _redundant() -> Row:
     return within("contacts", "four_feet", "four feet stick, of which two would do: motion in 1 s, m, rad, and sums of forces "
                   "over the weight", apart, 1e-9, "forces of rows that depend on each other are softened by 1e-8, which a second "
                   "step takes back", "it stays, and carries its weight", "redundant contacts move, or lose weight")
+
+
+def _table() -> Row:
+    """A table on four legs in space, pushed at the floor until friction gives way, with its weight in the middle, on the edge of
+    two legs, and nearly there."""
+    push, lever = parameters("push lever")
+    system = System("table", gravity=[0, 0, -G])
+    system.defaults.update({push: 4.0, lever: 0.15})
+    body = system.add_body("table", mass=2.0, inertia=[0.02, 0.03, 0.04])
+    system.add_joint(Free("free", system.ground, body, orientation=EulerAngles("ZYX")))
+    system.add_force(body, [push * time, 0.3 * push * time, 0], point=[0, 0, -0.1])
+    for k, (x, y) in enumerate(((-0.2, -lever), (0.2, -lever), (0.2, 0.3), (-0.2, 0.3))):
+        system.add_contact(Contact(f"leg_{k}", body, system.ground, shape=Point([x, y, -0.1]), friction=(0.6, 0.4)))
+    module, apart = system.compile(), 0.0
+    begin = 0.6 * 2.0 * G / (4.0 * math.hypot(1, 0.3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # of the border of two modes
+        for value in (0.15, 1e-3, 0.0):
+            solution = module.simulate((0.0, 1.002 * begin), q={module.metadata.q[2]: 0.1}, params={lever: value}, rtol=1e-10)
+            left = [t for name in ("leg_0", "leg_1") for t, mode in solution.contacts[name].switches if mode == SLIDING]
+            apart = max(apart, abs(min(left, default=0.0) - begin) / begin)
+    return within("contacts", "table", "four legs in space share friction, two of them with no load at last: the time at which "
+                  "the table slips, relative", apart, 1e-6, "forces of rows that depend on each other are softened by 1e-8, and "
+                  "differences of loads magnify that", "it slips where all friction is used", "legs that share forces hold too "
+                  "long, or not long enough")
+
+
+def _lifted() -> Row:
+    """A block on its floor that a force A sin(w t) lifts: nothing else accelerates it, so that rounding gives the sign of the
+    acceleration where it opens."""
+    amplitude, rate = parameters("amplitude rate")
+    system = System("lifted", gravity=[0, -G])
+    system.defaults.update({amplitude: 15.0, rate: 2.0})
+    body = system.add_body("block", mass=1.0)
+    y = coordinates("y")
+    system.add_joint(Prismatic("height", system.ground, body, axis=[0, 1], coordinate=y))
+    system.add_joint_force("height", amplitude * sin(rate * time) - y.dot / 5)
+    system.add_contact(Contact("floor", body, system.ground))
+    module, stream, apart, missed = system.compile(), np.random.default_rng(0), 0.0, 0
+    for a, w in zip(stream.uniform(11, 40, 20), stream.uniform(0.3, 8, 20), strict=True):
+        begin = math.asin(G / a) / w
+        switches = module.simulate((0.0, 1.2 * begin), params={amplitude: a, rate: w}, rtol=1e-9).contacts["floor"].switches
+        missed += len(switches) != 2
+        apart = max(apart, abs(switches[-1][0] - begin) / begin if len(switches) == 2 else math.inf)
+    return within("contacts", "lifted", f"a block that is lifted from rest, 20 forces, {missed} missed: time of opening, "
+                  "relative", apart, 1e-9, "events are located to the tolerance", "it opens where its force passes zero",
+                  "contacts stay closed, and pull")
 
 
 def _stiffness(short: bool) -> Iterator[Row]:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.backend.metadata import ValidityRange
 from symdyn.cli import main
 from symdyn.cli.summary import summarize
 from symdyn.errors import ArgumentError, SimulationWarning
@@ -194,15 +195,17 @@ def test_equations_by_hand_and_constraints_have_reports(tmp_path: Path) -> None:
 
 
 def test_what_loads_look_at_is_told() -> None:
-    looked_at = [["draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"],
-                 ["tilt", -np.inf, 0.3, "too steep: {value}"]]
-    values = np.column_stack([np.linspace(0.5, 4, 11), np.linspace(-1, 0.2, 11)])
+    looked_at = [ValidityRange("draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"),
+                 ValidityRange("tilt", -np.inf, 0.3, "too steep: {value}"),
+                 ValidityRange("creep", -np.inf, 4.0, "it creeps {value} m", True)]
+    values = np.column_stack([np.linspace(0.5, 4, 11), np.linspace(-1, 0.2, 11), np.full(11, 0.5)])
     run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values,
                                module=SimpleNamespace(metadata=SimpleNamespace(watches=looked_at), functions=("watches",)))
-    draft, tilt = run_tables.watches(run)
+    draft, tilt, creep = run_tables.watches(run)
     assert draft["outside"] and draft["message"] == "the box leaves the water at a draft of 0.5 m"
     assert (draft["least"], draft["most"], draft["limits"]) == ("0.5", "4", "from 1 to 9")
     assert not tilt["outside"] and not tilt["message"] and tilt["limits"] == "to 0.3"
+    assert creep["outside"] and creep["message"] == "it creeps 5 m" and creep["least"] == creep["most"] == "5"
 
 
 def test_curves_that_would_flatten_others_have_axes_of_their_own() -> None:
