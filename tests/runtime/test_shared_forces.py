@@ -45,7 +45,8 @@ def start(module: Any) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("friction", [(STATIC, KINETIC), STATIC])
-@pytest.mark.parametrize(("legs", "height"), [(LEGS, -0.05), (LEGS, 0.1), (FIVE, -0.05)])
+@pytest.mark.parametrize(("legs", "height"), [
+    (LEGS, -0.05), (LEGS, 0.1), (FIVE, -0.05), ([(-0.2, -0.15), (0.2, -0.15), (0.2, 0.3), (-0.2, 0.3)], -LOW)])
 def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(friction: Any, legs: Any, height: float) -> None:
     """A force c t above the middle: at c t = mu_s m g, then m x'' = c t - mu_k m g, though legs carry different loads."""
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
