@@ -54,6 +54,12 @@ def panels_of(solution: Solution, show: Sequence[str] | None = None) -> list[Pan
     return [part for panel in chosen for part in _parts(solution, panel)]
 
 
+def need_something(solution: Solution, show: Sequence[str] | None, found: object) -> None:
+    """Raises ArgumentError where nothing is found of what is to be shown."""
+    if show is not None and not found:
+        raise ArgumentError(f"{solution.module.name}: nothing of show = {list(show)!r} is in this motion")
+
+
 def _chosen(solution: Solution, panels: Sequence[Panel], show: Sequence[str]) -> list[Panel]:
     name = solution.module.name
     if not isinstance(show, (list, tuple)) or not all(isinstance(_name(entry), str) for entry in show):

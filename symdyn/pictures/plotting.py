@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from symdyn.errors import ArgumentError
 from symdyn.kinds import word
 from symdyn.pictures.bodies import draw_path
 from symdyn.pictures.curves import draw_panel
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.figure import Picture
-from symdyn.pictures.panels import Panel, panels_of
+from symdyn.pictures.marks import events_of, switches_of
+from symdyn.pictures.panels import Panel, need_something, panels_of
 from symdyn.pictures.style import STYLES, Style
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
-# Instants that are marked at most, and that are named at most.
-MOST_MARKS, MOST_NAMES = 80, 8
+# Events that are named at most.
+MOST_NAMES = 8
 # Sets of axes in one column at most, and columns.
 _ROWS, _COLUMNS = 4, 3
 
@@ -39,13 +39,11 @@ def plot(solution: Solution, path: Any = None, view: Any = None, show: Sequence[
     Returns the figure; saves it (PNG, PDF, SVG by the ending) if a path is given. Raises ArgumentError for names that there are
     not, and where nothing is left to show.
     """
-    name = solution.module.name
-    made_for = STYLES[word(style, STYLES, f"{name}: style")]
+    made_for = STYLES[word(style, STYLES, f"{solution.module.name}: style")]
     panels = panels_of(solution, show)
     mechanism = style == "screen" and (show is None or "mechanism" in show)
     drawing = Drawing.of(solution) if mechanism and len(solution.t) else None
-    if not panels and drawing is None and show is not None:
-        raise ArgumentError(f"{name}: nothing of show = {list(show)!r} is in this motion")
+    need_something(solution, show, panels or drawing)
     with matplotlib.rc_context(made_for.settings):
         figure = _figure(solution, panels, drawing, made_for, view)
         if style == "screen":
@@ -64,7 +62,7 @@ def _figure(solution: Solution, panels: Sequence[Panel], drawing: Drawing | None
     widths = [style.wide] * columns + ([side] if drawing else [])
     figure = Picture(figsize=(sum(widths), height), layout="constrained")
     grid = figure.add_gridspec(max(rows, 1), len(widths), width_ratios=widths)
-    events, switches = _events(solution), _switches(solution)
+    events, switches = events_of(solution), sorted({mark.t for mark in switches_of(solution)})
     shared: Any = None
     for k, panel in enumerate(panels):
         column, row = divmod(k, rows)
@@ -87,22 +85,6 @@ def _figure(solution: Solution, panels: Sequence[Panel], drawing: Drawing | None
         draw_path(figure, grid[:, columns], drawing, view)
     figure.align_ylabels()
     return figure
-
-
-def _events(solution: Solution) -> list[tuple[float, str]]:
-    """Times of the system's events, and their names; none where there are too many to be seen."""
-    found = sorted((float(t), name) for name, rows in solution.events.items() for t in rows.t)
-    return found if len(found) <= MOST_MARKS else []
-
-
-def _switches(solution: Solution) -> list[float]:
-    """Times at which contacts change their modes or hit, in order; none where there are too many to be seen."""
-    if not len(solution.t):
-        return []
-    begin = float(solution.t[0])
-    times = {float(t) for one in solution.contacts.values()
-             for t in (*[when for when, _ in one.switches], *one.impacts.t) if t != begin}
-    return sorted(times) if len(times) <= MOST_MARKS else []
 
 
 def _title(solution: Solution) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from symdyn.errors import ArgumentError
 from symdyn.kinds import flag
 from symdyn.pictures.arrows import TITLES, Arrows, arrows_of
 from symdyn.pictures.bending import bendings
+from symdyn.pictures.marks import events_of, switches_of
 from symdyn.pictures.mechanism import Hung, lengths_of, mechanism_of
-from symdyn.pictures.panels import panels_of
+from symdyn.pictures.panels import need_something, panels_of
 from symdyn.pictures.symbols import typeset_unit
 from symdyn.shown import shown
 from symdyn.viewer.arrays import packed
@@ -29,18 +31,19 @@ _LONGER = 0.02
 _MOST, _CURVES = 40_000, 2_000
 
 
-def view(solution: Solution, path: Any = None, compare: Any = None, forces: bool = False) -> View:
+def view(solution: Solution, path: Any = None, compare: Any = None, forces: bool = False,
+         show: Sequence[str] | None = None) -> View:
     """A page that plays a motion, see Solution.view."""
     flag(forces, f"{solution.module.name}: forces")
-    motions = [_motion(solution, forces)]
+    motions = [_motion(solution, forces, show)]
     if compare is not None:
         if not hasattr(compare, "module") or not hasattr(compare, "rows"):
             raise ArgumentError(f"{solution.module.name}: compare is {shown(compare)}; pass another solution")
-        motions.append(_motion(compare, forces))
+        motions.append(_motion(compare, forces, show))
     return page_of(solution.module.name, {"kind": "recorded", "name": solution.module.name, "motions": motions}, "", path)
 
 
-def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
+def _motion(solution: Solution, forces: bool, show: Sequence[str] | None) -> dict[str, Any]:
     module, name = solution.module, solution.module.name
     about = module.metadata
     if "frames" not in module.functions or not about.bodies:
@@ -67,7 +70,8 @@ def _motion(solution: Solution, forces: bool) -> dict[str, Any]:
     scene |= {"kind": "recorded", "name": name, "t": packed(t[rows]), "origins": packed(chosen[..., :3].reshape(len(rows), -1)),
               "turns": packed(_quaternions(chosen[..., 3:].reshape(len(rows), n_b, 3, 3)).reshape(len(rows), -1)),
               "points": _locals(hung), "axes": _axes(hung), "success": bool(solution.success),
-              "message": str(solution.message), "panels": _panels(solution, order)}
+              "message": str(solution.message), "panels": _panels(solution, order, show),
+              "marks": {"events": events_of(solution), "modes": switches_of(solution)}}
     eta = list(dict.fromkeys(c for record in about.flexible for c in record["coordinates"]))
     if eta:
         scene["eta"] = {"names": eta, "values": packed(np.column_stack([solution[c] for c in eta])[order][rows])}
@@ -136,12 +140,13 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
     return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
 
 
-def _panels(solution: Solution, order: np.ndarray) -> list[dict[str, Any]]:
-    """Curves over time, thinned."""
+def _panels(solution: Solution, order: np.ndarray, show: Sequence[str] | None) -> list[dict[str, Any]]:
+    """Curves over time, thinned; show: which ones, None for all."""
     stride = max(1, -(-len(order) // _CURVES))
     rows = order[np.unique([*range(0, len(order), stride), len(order) - 1])]
-    found = []
-    for panel in panels_of(solution):
+    panels, found = panels_of(solution, show), []
+    need_something(solution, show, panels or (show is not None and "mechanism" in show))
+    for panel in panels:
         values = panel.values[rows]
         if np.isfinite(values).all():
             title = f"{panel.title}: {panel.part}" if panel.part else panel.title

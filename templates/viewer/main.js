@@ -124,7 +124,7 @@ function playControls(parent, below, stage, scenes, say) {
     scenes.forEach((scene, k) => {
         const box = element(below, "section");
         if (scenes.length > 1) element(box, "h2", "", `${k ? "right" : "left"}: ${scene.data.name}`);
-        for (const panel of scene.data.panels) plots.push(new Plot(panel, box, time => { pause(); seek(time); }));
+        for (const panel of scene.data.panels) plots.push(new Plot(panel, box, time => { pause(); seek(time); }, scene.data.marks));
         if (!scene.data.success) say(`The motion stopped early: ${scene.data.message}`);
     });
     const play = button(parent, "▶", "Play", () => playing ? pause() : go());

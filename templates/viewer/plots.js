@@ -1,4 +1,4 @@
-// Curves over time with a cursor.
+// Curves over time with a cursor, and marks where something happens.
 const number = v => Number.isFinite(v) ? (Math.abs(v) >= 1e5 || (v && Math.abs(v) < 1e-3) ? v.toExponential(2) : String(+v.toPrecision(4))) : "";
 
 // Round numbers within a range, about as many as asked for.
@@ -9,9 +9,16 @@ function ticks(low, high, count) {
     return found;
 }
 
+// Pixels from a mark within which the pointer shows its names; of those that are next to each other there all.
+const REACH = 5, SAME = 1;
+// Dashes of marks by their kind: events, and changes of the modes of contacts.
+const DASHES = { events: [5, 4], modes: [1, 3] };
+
 class Plot {
-    constructor(panel, parent, seek) {
+    // marks: by kind times with names; none in pages that were stored without.
+    constructor(panel, parent, seek, marks = {}) {
         this.panel = panel;
+        this.marks = Object.keys(DASHES).flatMap(kind => (marks[kind] || []).map(([t, name]) => ({ kind, t, name })));
         [this.t] = columnsOf(panel.t);
         this.columns = columnsOf(panel.values);
         const figure = element(parent, "figure", "plot");
@@ -22,24 +29,50 @@ class Plot {
             return range > 0 ? Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(range)))) : 12;
         });
         this.values = panel.names.map((name, k) => {
-            const entry = element(caption, "span", "entry");
-            element(entry, "i").style.background = this.color(k);
-            symbol(entry, name);
+            const entry = element(caption, "span", "entry"), made = button(entry, "", name, () => this.toggle(k));
+            element(made, "i", this.dashed(k) ? "dashed" : "").style.color = this.color(k);
+            symbol(made, name);
+            made.title = "Hide or show this curve";
+            made.setAttribute("aria-pressed", "true");
             return element(entry, "output");
         });
+        this.entries = [...caption.querySelectorAll("button")];
         this.box = element(figure, "div", "curves");
         this.canvas = element(this.box, "canvas");
         this.canvas.setAttribute("role", "img");
         this.canvas.setAttribute("aria-label", `${panel.title}: ${panel.names.join(", ")} over time`);
         this.cursor = element(this.box, "div", "cursor");
-        const at = event => seek(this.time(event.clientX - this.canvas.getBoundingClientRect().left));
+        this.tip = element(this.box, "div", "tip");
+        this.tip.hidden = true;
+        const place = event => event.clientX - this.canvas.getBoundingClientRect().left;
+        const at = event => { seek(this.time(place(event))); this.hover(place(event)); };
         this.canvas.addEventListener("pointerdown", event => { this.canvas.setPointerCapture(event.pointerId); at(event); });
-        this.canvas.addEventListener("pointermove", event => { if (event.buttons) at(event); });
+        this.canvas.addEventListener("pointermove", event => event.buttons ? at(event) : this.hover(place(event)));
+        this.canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
         new ResizeObserver(() => this.draw()).observe(this.box);
         matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     }
 
     color(k) { return PALETTE[k % PALETTE.length]; }
+
+    dashed(k) { return k >= PALETTE.length; }
+
+    shown(k) { return this.entries[k].getAttribute("aria-pressed") === "true"; }
+
+    toggle(k) {
+        this.entries[k].setAttribute("aria-pressed", String(!this.shown(k)));
+        this.draw();
+    }
+
+    // The names of what happens next to a place.
+    hover(x) {
+        const away = t => Math.abs(this.x(t) - x), nearest = this.marks.reduce((best, mark) => !best || away(mark.t) < away(best.t) ? mark : best, null);
+        this.tip.hidden = !nearest || away(nearest.t) > REACH;
+        if (this.tip.hidden) return;
+        const names = this.marks.filter(({ t }) => Math.abs(this.x(t) - this.x(nearest.t)) < SAME).map(({ name }) => name);
+        this.tip.textContent = `${[...new Set(names)].join(", ")} at ${number(nearest.t)} s`;
+        this.tip.style.left = `${Math.max(0, Math.min(this.x(nearest.t) + 6, this.wide - this.tip.offsetWidth - 4))}px`;
+    }
 
     get span() { return this.t[this.t.length - 1] - this.t[0] || 1; }
 
@@ -60,7 +93,8 @@ class Plot {
         g.fillRect(0, 0, this.wide, high);
         g.font = "11px system-ui, sans-serif";
         let low = Infinity, top = -Infinity;
-        for (const column of this.columns) for (const v of column) { low = Math.min(low, v); top = Math.max(top, v); }
+        const visible = this.columns.filter((_, k) => this.shown(k));
+        for (const column of visible.length ? visible : this.columns) for (const v of column) { low = Math.min(low, v); top = Math.max(top, v); }
         if (!(top > low)) [low, top] = [low - 1, top + 1];
         const y = v => 6 + (top - v) / (top - low) * (high - 28);
         g.textBaseline = "middle";
@@ -73,10 +107,16 @@ class Plot {
         }
         g.textAlign = "center";
         for (const v of ticks(this.t[0], this.t[0] + this.span, Math.max(2, this.wide / 110))) g.fillText(number(v), this.x(v), high - 8);
+        g.strokeStyle = style.getPropertyValue("--quiet");
+        for (const { kind, t } of this.marks) {
+            g.setLineDash(DASHES[kind]);
+            g.beginPath(); g.moveTo(this.x(t), 6); g.lineTo(this.x(t), high - 22); g.stroke();
+        }
         this.columns.forEach((column, k) => {
+            if (!this.shown(k)) return;
             g.strokeStyle = this.color(k);
             g.lineWidth = 1.5;
-            g.setLineDash(k >= PALETTE.length ? [5, 3] : []);
+            g.setLineDash(this.dashed(k) ? [5, 3] : []);
             g.beginPath();
             column.forEach((v, i) => g[i ? "lineTo" : "moveTo"](this.x(this.t[i]), y(v)));
             g.stroke();

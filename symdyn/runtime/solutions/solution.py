@@ -668,15 +668,19 @@ class Solution:
 
         return animate(self, path, fps, speed, view, forces)
 
-    def view(self, path: PathName | None = None, compare: Solution | None = None, forces: bool = False) -> View:
+    def view(self, path: PathName | None = None, compare: Solution | None = None, forces: bool = False,
+             show: Sequence[str | sp.Symbol] | None = None) -> View:
         """The motion to look at: a page that plays, turns and zooms, with the curves below.
 
         path      where to write it, one HTML file that needs no network; in a notebook the result shows itself
         compare   another motion, which is shown next to this one at the same times
         forces    with the forces and torques in the joints, those of loads where they act, and weights as arrows; their code is
                   compiled when it is first used
-        Raises ArgumentError for a module that gives no frames of bodies, for positions that are not finite, and for another
-        ending than .html; MissingExtra without matplotlib.
+        show      which curves are below, as for `plot`; ["mechanism"]: none, since the mechanism is always there
+
+        Events are marked by dashed lines, changes of the modes of contacts by dotted ones, with their names under the pointer.
+        Raises ArgumentError for a module that gives no frames of bodies, for positions that are not finite, for names that there
+        are not, and for another ending than .html; MissingExtra without matplotlib.
 
         >>> import tempfile
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
@@ -685,7 +689,7 @@ class Solution:
         """
         from symdyn.viewer import view
 
-        return view(self, path, compare, forces)
+        return view(self, path, compare, forces, show)
 
     def report(self, path: PathName) -> Path:
         """Write one HTML file with everything about the run: parameters, start, curves, extremes, energy, pictures, and what
