@@ -25,16 +25,17 @@ MAX_FRAMES = 3000
 
 
 def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 1.0,
-            view: Any = None, forces: bool = False) -> FuncAnimation:
+            view: Any = None, forces: bool = False, inertia: bool = False) -> FuncAnimation:
     """The moving bodies, with the way of the last centre of mass.
 
     forces  with arrows of forces in joints, loads and weights, and torques in joints and of loads
+    inertia with the ellipsoids of inertia of bodies
     fps     pictures a second; speed: seconds of motion in one second of film
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
     path    where to save the film: a .gif, which needs Pillow and nothing else, or an .mp4 by the program ffmpeg
 
     Returns the animation; a notebook shows it. Raises ArgumentError if the module gives no positions, if nothing can be drawn,
-    for another ending, and for .mp4 without ffmpeg.
+    for ellipsoids where no body has one, for another ending, and for .mp4 without ffmpeg.
     """
     target = None if path is None else as_path(path, "of the animation", "motion.gif")
     if target is not None and target.suffix.lower() not in (".gif", ".mp4"):
@@ -45,7 +46,8 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
         raise ArgumentError(f"fps and speed must be positive, fps from {LEAST_FPS} to {1 / LEAST_FPS:.0f}, found fps = {rate:g}, "
                             f"speed = {speed:g}")
     flag(forces, f"{solution.module.name}: forces")
-    whole = Drawing.of(solution, forces) if len(solution.t) > 1 else None
+    flag(inertia, f"{solution.module.name}: inertia")
+    whole = Drawing.of(solution, forces, inertia=inertia) if len(solution.t) > 1 else None
     if whole is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to animate: at least two times and the function "
                             "'positions' are needed, and bodies that extend or move")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.errors import ArgumentError
 from symdyn.pictures.arrows import Arrows, arcs, arrows_of, straight, touching
 from symdyn.pictures.grounds import Ground
 from symdyn.pictures.looks import carriers, up_of
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 _LEFT_OUT = 1e-9
+# What ellipsoids of inertia need of a module.
+_OF_ELLIPSOIDS = ("frames", "joint_points", "joint_axes", "inertial_parameters")
 
 
 @dataclass(frozen=True)
@@ -96,11 +99,14 @@ class Drawing:
         return len(self.labels) == 3
 
     @classmethod
-    def of(cls, solution: Solution, forces: bool = False, span: tuple[float, float] | None = None) -> Drawing | None:
+    def of(cls, solution: Solution, forces: bool = False, span: tuple[float, float] | None = None,
+           inertia: bool = False) -> Drawing | None:
         """What can be drawn of a motion; None if the module gives no positions, or nothing moves.
 
-        forces   with arrows of forces in joints, loads and weights; those of contacts are always there
-        span     the part of the motion that is shown, s: rails and what has no size of its own are as long as it needs; None: all
+        forces    with arrows of forces in joints, loads and weights; those of contacts are always there
+        span      the part of the motion that is shown, s, and for which rails and what has no size are long enough; None: all
+        inertia   with the ellipsoids of inertia
+        Raises ArgumentError where these are asked for and no body has one.
         """
         if "positions" not in solution.module.functions:
             return None
@@ -108,7 +114,9 @@ class Drawing:
         centres = solution.rows("positions").reshape(n_t, -1, 3)
         if not centres.shape[1] or not np.isfinite(centres).all():
             return None
-        solids = Solids.of(solution, span)
+        solids = Solids.of(solution, span, inertia)
+        if inertia and not (solids is not None and any(part.glass for part in solids.parts)):
+            raise _no_ellipsoid(solution)
         if solids is not None and solids.forms is not None:
             made = carriers(about.bodies, about.reactions, about.reaction_bodies)
             centres = np.delete(centres, sorted(made), axis=1)
@@ -158,6 +166,14 @@ class Drawing:
         longest = (high - low).max()
         half = np.maximum((high - low) / 2, 0.15 * longest) + 0.06 * longest
         return np.column_stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _no_ellipsoid(solution: Solution) -> ArgumentError:
+    missing = [name for name in _OF_ELLIPSOIDS if name not in solution.module.functions]
+    why = (f"its module has no function {missing[0]!r}, which mechanisms of rigid bodies without added mass have" if missing else
+           "moments of inertia about centres of mass are zero, or too small to be seen; give inertia to its bodies")
+    return ArgumentError(f"{solution.module.name}: inertia=True draws ellipsoids of inertia, and there is none: {why}, or leave "
+                         "inertia out")
 
 
 def _without(skeleton: Skeleton, bare: Sequence[int], solids: Solids | None) -> Skeleton:

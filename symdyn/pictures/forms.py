@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 
 from symdyn.pictures.looks import Item, Mechanism, looks_of
 from symdyn.pictures.mechanism import Hung, Posed
-from symdyn.pictures.meshes import Part, box, line, sweep
+from symdyn.pictures.meshes import Part, box, globe, line, sweep
 from symdyn.pictures.ropes import POINTS, mooring, rope
 
 # Bands of a ball, and the turns of a coil with their points.
@@ -50,7 +50,7 @@ class Form:
             return mooring(a, posed.at(item.ends[1]), length, give, friction, bool(seabed), shown)
         if item.kind == "ball":
             return np.asarray(a + item.size[0] * own)
-        if item.kind in ("block", "box"):
+        if item.kind in ("block", "box", "ellipsoid"):
             return np.asarray(a + (own * item.size) @ self._turned(posed).T)
         if item.kind in ("pin", "disc"):
             half = item.size[1] * posed.axes[item.axis]
@@ -95,18 +95,18 @@ class Forms:
     far: Sequence[int] = ()
 
     @classmethod
-    def of(cls, m: Mechanism) -> Forms:
-        """What is always shown of a mechanism."""
+    def of(cls, m: Mechanism, inertia: bool = False) -> Forms:
+        """What is always shown of a mechanism; inertia: with the ellipsoids of inertia."""
+        layers = ("", "inertia") if inertia else ("",)
         with np.errstate(all="ignore"):
             items, length = looks_of(m)
-        return cls([form for item in items if not item.layer for form in _forms(item)], Hung.of(m), np.array(m.up), length,
+        return cls([form for item in items if item.layer in layers for form in _forms(item)], Hung.of(m), np.array(m.up), length,
                    m.anchors)
 
     def vertices(self, origins: np.ndarray, rotations: np.ndarray) -> list[np.ndarray]:
         """Of every part at one time; origins (n_b + 1, 3) and rotations (n_b + 1, 3, 3), the last the ground's."""
         posed = self.hung.at(origins, rotations)
         return [form.place(posed, self.up) for form in self.forms]
-
 
     def near(self, origins: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Points at all times that pictures show, (n_t, n, 3); origins (n_t, n_b + 1, 3), rotations (n_t, n_b + 1, 3, 3)."""
@@ -125,6 +125,8 @@ def _forms(item: Item) -> list[Form]:
     color, size, body = to_rgb(item.color), item.size, item.body
     if item.kind == "ball":
         return [Form(_ball(body, color), item)]
+    if item.kind == "ellipsoid":
+        return [Form(globe(body, color), item)]
     if item.kind in ("block", "box"):
         (made,) = box(body, color, np.full(3, 2.0), np.zeros(3))
         return [Form(made, item)]

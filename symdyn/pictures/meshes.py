@@ -30,6 +30,7 @@ class Part:
     width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another
     ground     whether it is what bodies stand on: behind all that the eye above it sees; open: whether it has no inside, and is
                seen from both sides
+    glass      whether it is seen through, over all others: its outline, filled in pale, and its edges
     """
 
     body: int
@@ -46,6 +47,7 @@ class Part:
     convex: bool = True
     ground: bool = False
     open: bool = False
+    glass: bool = False
 
 
 def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None = None, bends: bool = False) -> Iterator[Part]:
@@ -105,6 +107,20 @@ def line(body: int, color: Color, points: np.ndarray, width: float, to: int | No
     nothing = np.zeros((0, 4), dtype=int)
     edges = np.array([[k, k + 1, -1, -1] for k in range(len(points) - 1)])
     return Part(body, color, points, points, (), nothing, nothing, edges, np.ones(len(edges), dtype=bool), width, to)
+
+
+def globe(body: int, color: Color) -> Part:
+    """A unit ball that is seen through, with the circles across its three axes."""
+    angles = 2 * np.pi * np.arange(_WHEEL) / _WHEEL
+    circle = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    heights = np.cos(np.pi * np.arange(1, _WHEEL // 2) / (_WHEEL // 2))
+    rings = [np.sqrt(1 - z * z) * circle + [0.0, 0.0, z] for z in heights]
+    vertices = np.concatenate([*(np.roll(circle, k, axis=1) for k in range(3)), *rings])
+    steps = np.arange(_WHEEL)
+    edges = np.concatenate([np.column_stack([k * _WHEEL + steps, k * _WHEEL + (steps + 1) % _WHEEL]) for k in range(3)])
+    nothing = np.zeros((0, 4), dtype=int)
+    return Part(body, color, vertices, vertices, (), nothing, nothing, np.pad(edges, ((0, 0), (0, 2)), constant_values=-1),
+                np.ones(len(edges), dtype=bool), glass=True)
 
 
 def _triangles(body: int, color: Color, vertices: np.ndarray, faces: np.ndarray) -> Part:

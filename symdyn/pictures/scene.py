@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
+from scipy.spatial import ConvexHull
 
 from symdyn.pictures.painter import Camera, cut, order, planes
 from symdyn.pictures.solids import Solids, Water
@@ -16,6 +17,8 @@ _WATER_ALPHA = 0.38
 _PER_WAVE, _MOST_STRIPS, _SEAM, _CREST = 24, 240, 0.0, 0.3
 # Of a colour: what is left in the shade, and along edges.
 _SHADE, _EDGE = 0.5, 0.6
+# Of what is seen through: how much of it covers what is behind; the width of its outline.
+_GLASS_ALPHA, _OUTLINE = 0.28, 0.9
 
 
 class Scene(PolyCollection):
@@ -90,7 +93,7 @@ class Scene(PolyCollection):
         for strip, color in self._surface(water, camera) if water is not None else ():
             surface.add(camera.project(strip), color, _SEAM if water is not None and water.waves else 0.8)
         above = camera.eye[2] > water.level * camera.eye[3] if water is not None else True
-        together = (low, surface, high) if above else (high, surface, low)
+        together = (*((low, surface, high) if above else (high, surface, low)), *self._glass(camera))
         self.set_verts([polygon for pieces in together for polygon in pieces.polygons], closed=True)
         colors: Any = np.array([color for pieces in together for color in pieces.colors]).reshape(-1, 4)
         self.set_facecolor(colors)
@@ -101,8 +104,26 @@ class Scene(PolyCollection):
         """The parts from back to front: the ground behind all that is on it."""
         parts = self._solids.parts
         ground = [k for k, part in enumerate(parts) if part.ground]
-        others = [k for k, part in enumerate(parts) if not part.ground]
+        others = [k for k, part in enumerate(parts) if not (part.ground or part.glass)]
         return [*ground, *[others[k] for k in order([parts[k] for k in others], [self._places[k] for k in others], camera)]]
+
+    def _glass(self, camera: Camera) -> tuple[_Pieces, _Pieces]:
+        """What is seen through: the areas within its outlines, and its lines, from back to front."""
+        areas, lines = _Pieces(1.0, self._opacity * _GLASS_ALPHA), _Pieces(self._opacity)
+        glass = [(part, places) for part, places in zip(self._solids.parts, self._places, strict=True) if part.glass]
+        if glass:
+            way = camera.toward(np.concatenate(self._places).mean(axis=0))
+            glass.sort(key=lambda one: -camera.distance(one[1].mean(axis=0), way))
+        for part, places in glass:
+            flat = camera.project(places)
+            outline = flat[ConvexHull(flat).vertices]
+            areas.add(outline, np.array(part.color), _SEAM)
+            dark = _EDGE * np.array(part.color)
+            for ends in flat[part.edges[:, :2]]:
+                lines.add(ends, dark, part.width)
+            for ends in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+                lines.add(np.array(ends), dark, _OUTLINE)
+        return areas, lines
 
     def _surface(self, water: Water, camera: Camera) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """The water's rectangle, or its strips along the crests of waves from back to front: corners (n, 3) and colour."""

@@ -85,10 +85,11 @@ class Solids:
         return [*self.own, *(form.part for form in (self.forms.forms if self.forms is not None else ()))]
 
     @classmethod
-    def of(cls, solution: Solution, span: tuple[float, float] | None = None) -> Solids | None:
+    def of(cls, solution: Solution, span: tuple[float, float] | None = None, inertia: bool = False) -> Solids | None:
         """The shapes of a motion; None if its module has none. Raises ArgumentError for a colour that does not exist.
 
-        span   the part of it that is shown, s; None: all
+        span      the part of it that is shown, s; None: all
+        inertia   with the ellipsoids of inertia of its bodies
         """
         module = solution.module
         records = module.metadata.drawn
@@ -100,7 +101,7 @@ class Solids:
         if not np.isfinite(frames).all():
             return None
         mechanism = mechanism_of(solution, frames, int(solution.t.argmin()), span)
-        forms = Forms.of(mechanism) if jointed else None
+        forms = Forms.of(mechanism, inertia) if jointed else None
         length = forms.length if forms is not None else float(np.ptp(frames[..., :3], axis=(0, 1)).max(initial=0.0))
         still = np.concatenate([np.zeros(3), np.eye(3).ravel()])
         frames = np.concatenate([frames, np.broadcast_to(still, (len(frames), 1, 12))], axis=1)

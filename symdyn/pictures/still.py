@@ -24,19 +24,22 @@ _SIDE = 4.2
 _MARGIN, _ABOVE = 0.015, 0.1
 
 
-def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None, forces: bool = False) -> Figure:
+def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None, forces: bool = False,
+            inertia: bool = False) -> Figure:
     """The mechanism at one time or several (default: start and end), side by side in axes of the same limits.
 
     view     elevation and azimuth of the eye, degrees, or one pair for each picture
     forces   with arrows of forces in joints, loads and weights, and torques in joints and of loads
+    inertia  with the ellipsoids of inertia of bodies
 
-    Returns the figure; saves it if a path is given. Raises ArgumentError for times outside of the motion, and if nothing can be
-    drawn.
+    Returns the figure; saves it if a path is given. Raises ArgumentError for times outside of the motion, if nothing can be
+    drawn, and for ellipsoids where no body has one.
     """
     flag(forces, f"{solution.module.name}: forces")
+    flag(inertia, f"{solution.module.name}: inertia")
     times, views = _pictures(solution, t, view) if len(solution.t) else (np.zeros(0), [])
     span = (float(times.min()), float(times.max())) if len(times) > 1 else None
-    drawing = Drawing.of(solution, forces, span) if len(times) else None
+    drawing = Drawing.of(solution, forces, span, inertia) if len(times) else None
     if drawing is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to draw: the function 'positions' is needed, and bodies "
                             "that extend or move")

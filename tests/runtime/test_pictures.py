@@ -29,6 +29,7 @@ image = pytest.importorskip("PIL.Image")
 from symdyn.pictures import animate, plot  # noqa: E402
 from symdyn.pictures.drawing import Drawing  # noqa: E402
 from symdyn.pictures.points import points_of  # noqa: E402
+from symdyn.pictures.scene import Scene  # noqa: E402
 from symdyn.pictures.solids import Solids  # noqa: E402
 
 ROOT = str(Path(symdyn.__file__).parents[1])
@@ -555,6 +556,111 @@ def test_pictures_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
             (lambda: solution.report(3), "the path where to write the report is 3; pass text or a Path")):
         with pytest.raises(ArgumentError, match=message):
             give()
+
+
+# -- ellipsoids of inertia
+
+
+SEMI_AXES, CENTRE, MASS = np.array([0.5, 0.3, 0.2]), np.array([0.1, -0.2, 0.3]), 2.0
+
+
+@pytest.fixture(scope="module")
+def tumbling() -> Solution:
+    """A homogeneous ellipsoid that flies and turns, without gravity."""
+    system = symdyn.System("ellipsoid")
+    squares = SEMI_AXES**2
+    body = system.add_body("body", mass=MASS, inertia=(MASS / 5 * (squares.sum() - squares)).tolist(), com=CENTRE.tolist())
+    system.add_joint(symdyn.Free("free", system.ground, body))
+    return system.compile(backend="numpy").simulate((0, 1), u=[0.3, 0, 0, 1.0, 2.0, 0.5], rtol=1e-8)
+
+
+def areas(figure: Any, axes: int = 0) -> list[np.ndarray]:
+    """Corners of what is pale in a picture: the areas within outlines."""
+    figure.canvas.draw()
+    (scene,) = [one for one in figure.axes[axes].collections if isinstance(one, Scene)]
+    pale = scene.get_facecolor()[:, 3] < 1
+    return [path.vertices[:-1] for path, one in zip(scene.get_paths(), pale, strict=True) if one]
+
+
+def area(corners: np.ndarray) -> float:
+    x, y = corners.T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+
+def test_an_ellipsoid_is_the_homogeneous_one_of_the_same_inertia(tumbling: Solution) -> None:
+    """Its points are at one distance from its centre in units of the semi-axes, and reach as far as these."""
+    solids, bare = Solids.of(tumbling, inertia=True), Solids.of(tumbling)
+    assert solids is not None and bare is not None and not any(part.glass for part in bare.parts)
+    (place,) = [k for k, part in enumerate(solids.parts) if part.glass]
+    for index in (0, len(tumbling.t) // 2, -1):
+        frame = tumbling.frames.reshape(len(tumbling.t), 12)[index]
+        own = (solids.vertices(index)[place] - frame[:3]) @ frame[3:].reshape(3, 3) - CENTRE
+        assert np.linalg.norm(own / SEMI_AXES, axis=1) == pytest.approx(1.0, abs=1e-9)
+        assert np.abs(own).max(axis=0) == pytest.approx(SEMI_AXES, rel=1e-6)
+
+
+def test_the_outline_of_an_ellipsoid_is_within_the_picture_of_a_plane() -> None:
+    """In a plane, where all that is known is the moment about its normal, a circle: 2/5 m r² of a ball is I."""
+    system = symdyn.System("disc", gravity=[0, -9.81])
+    q = symdyn.coordinates("q")
+    body = system.add_body("body", mass=2.0, inertia=0.18, com=[0.1, 0])
+    system.add_joint(symdyn.Revolute("pin", system.ground, body, q))
+    solution = system.compile(backend="numpy").simulate((0, 0.5), rtol=1e-8)
+    radius = np.sqrt(5 / 2 * 0.18 / 2.0)
+    figure = solution.picture([0.0, 0.4], inertia=True)
+    for axes, t in enumerate((0.0, 0.4)):
+        (corners,) = areas(figure, axes)
+        assert area(corners) == pytest.approx(np.pi * radius**2, rel=5e-3)
+        angle = solution(t)[0]
+        assert corners.mean(axis=0) == pytest.approx(0.1 * np.array([np.cos(angle), np.sin(angle)]), abs=1e-3)
+        low, high = np.transpose([figure.axes[axes].get_xlim(), figure.axes[axes].get_ylim()])
+        assert (corners > low).all() and (corners < high).all()
+    assert not areas(solution.picture(0.4))
+
+
+def test_the_nearer_of_two_ellipsoids_is_drawn_over_the_other() -> None:
+    system = symdyn.System("two")
+    for name, x in (("first", -0.5), ("second", 0.5)):
+        body = system.add_body(name, mass=1.0, inertia=[0.02] * 3)
+        q = symdyn.coordinates(f"q_{name}")
+        system.add_joint(symdyn.Prismatic(name, system.ground, body, axis=[1, 0, 0], coordinate=q, parent_point=[x, 0, 0]))
+    solution = system.compile(backend="numpy").simulate((0, 0.1), rtol=1e-5)
+    # Both are balls of one size, which perspective makes larger where they are nearer; the eye is first ahead, then behind.
+    sizes = []
+    for azimuth in (0.0, 180.0):
+        back, front = map(area, areas(solution.picture(0.0, view=(0, azimuth), inertia=True)))
+        sizes.append(front / back)
+    assert min(sizes) > 1.05
+
+
+def test_films_have_ellipsoids_at_every_time(tumbling: Solution, tmp_path: Path) -> None:
+    film = animate(tumbling, tmp_path / "film.gif", fps=4, inertia=True)
+    outlines = []
+    for k in (0, 4):
+        film.place(k)
+        (corners,) = areas(film.figure)
+        outlines.append(corners)
+    assert area(outlines[0]) != pytest.approx(area(outlines[1]), rel=1e-3)
+    with image.open(tmp_path / "film.gif") as whole, image.open(io.BytesIO(animate(tumbling, fps=4).gif())) as bare:
+        assert whole.n_frames == bare.n_frames == 5
+        differ = np.asarray(whole.convert("RGB"), dtype=int) != np.asarray(bare.convert("RGB"), dtype=int)
+    assert differ.any(axis=2).mean() > 0.01
+
+
+def test_ellipsoids_that_there_are_not_are_reported(tumbling: Solution) -> None:
+    with pytest.raises(ArgumentError, match="pendulum: inertia=True draws ellipsoids of inertia, and there is none: moments of "
+                                            "inertia about centres of mass are zero, or too small to be seen; give inertia"):
+        motion("pendulum").picture(inertia=True)
+    metadata = tumbling.module.metadata
+    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f != "inertial_parameters"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tumbling.module, "metadata", fewer)
+        with pytest.raises(ArgumentError, match="its module has no function 'inertial_parameters', which mechanisms of rigid "
+                                                "bodies without added mass have, or leave inertia out"):
+            animate(tumbling, inertia=True)
+    for draw in (tumbling.picture, tumbling.animate):
+        with pytest.raises(ArgumentError, match="ellipsoid: inertia is 'all'; pass True or False"):
+            draw(inertia="all")
 
 
 # -- places they are shown in

@@ -631,13 +631,15 @@ class Solution:
         return plot(self, path, view, show, style)
 
     def picture(self, t: Times | PathName | None = None, path: PathName | None = None,
-                view: Sequence[float] | Sequence[Sequence[float]] | None = None, forces: bool = False) -> Figure:
+                view: Sequence[float] | Sequence[Sequence[float]] | None = None, forces: bool = False,
+                inertia: bool = False) -> Figure:
         """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
         it if a path is given, which may also stand alone: picture("rest.png").
 
         view     as for `plot`, or one for each picture
         forces   with arrows of forces in joints, loads and weights, and of torques, as `view` has them
-        Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
+        inertia  with the homogeneous ellipsoids that have the mass, centre of mass and inertia of their bodies
+        Raises ArgumentError for times outside of the motion, if nothing can be drawn, and for ellipsoids where no body has one.
 
         >>> import tempfile
         >>> folder = tempfile.mkdtemp()
@@ -648,15 +650,15 @@ class Solution:
 
         if path is None and isinstance(t, (str, os.PathLike)):
             t, path = None, t
-        return picture(self, t, path, view, forces)
+        return picture(self, t, path, view, forces, inertia)
 
     def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
-                view: Sequence[float] | None = None, forces: bool = False) -> FuncAnimation:
+                view: Sequence[float] | None = None, forces: bool = False, inertia: bool = False) -> FuncAnimation:
         """The moving bodies; returns the matplotlib animation, and saves it if a path is given: as .gif, or as .mp4 where the
         program ffmpeg is installed.
 
         fps      pictures a second; speed: seconds of motion in one second of film; view: as for `plot`
-        forces   with arrows, as for `picture`
+        forces   with arrows, and inertia: with ellipsoids, as for `picture`
         Raises ArgumentError for another ending, for .mp4 without ffmpeg, and if nothing can be drawn.
 
         >>> import tempfile
@@ -666,7 +668,7 @@ class Solution:
         """
         from symdyn.pictures import animate
 
-        return animate(self, path, fps, speed, view, forces)
+        return animate(self, path, fps, speed, view, forces, inertia)
 
     def view(self, path: PathName | None = None, compare: Solution | None = None, forces: bool = False,
              show: Sequence[str | sp.Symbol] | None = None) -> View:
