@@ -39,11 +39,15 @@ COMMANDS = {
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
     "optimize": "symdyn bench optimize",
+    "contacts": "symdyn bench contacts",
+    "predictions": "symdyn bench predictions",
+    "backends": "python tests/checks/backends.py",
     "printing": "symdyn bench printing",
     "sympy": "symdyn bench sympy",
     "comparison": "symdyn compare --all",
     "tolerance": "python docs/extensions/tolerance.py",
     "reference": "python tests/checks/public_names.py generated/site",
+    "site": "python tests/checks/whole_site.py generated/site",
     "walk": "python tests/checks/walk.py generated/site",
 }
 # A line with a figure, as the lab prints it: its name, the number, the unit, the bound, whether that is missed.
