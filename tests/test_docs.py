@@ -105,6 +105,52 @@ def test_errors_against_tolerances_are_the_stored_ones() -> None:
     assert errors["n_link_pendulum(5), 10 s"][1e-12] == "2.0e-04"
 
 
+def stored(name: str) -> list[str]:
+    """The lines of a stored result."""
+    found: list[str] = json.loads((ROOT / "docs" / "measured" / f"{name}.json").read_text(encoding="utf-8"))["lines"]
+    return found
+
+
+def test_how_much_longer_numpy_takes_is_stored() -> None:
+    """The least and the largest ratio of docs/choosing_a_method.md."""
+    ratios = sorted(int(line.split()[-1]) for line in stored("backends")[1:])
+    page = (ROOT / "docs" / "choosing_a_method.md").read_text(encoding="utf-8")
+    assert f"takes {ratios[0]} to {ratios[-1]} times as long with NumPy" in page
+
+
+def test_predictions_of_sweeps_are_the_stored_ones() -> None:
+    """The table of docs/clusters.md, and what its text says of memory."""
+    page = (ROOT / "docs" / "clusters.md").read_text(encoding="utf-8")
+    _, *sweeps, _, merged = stored("predictions")
+    names = "double pendulums", "four-bar linkages", "pendulums of four links, with Parquet"
+    for line, name in zip(sweeps, names, strict=True):
+        cells = re.findall(r"[\d.]+", line)
+        core, wall, result, memory = (f"{a} and {b}" for a, b in zip(cells[1::2], cells[2::2], strict=True))
+        assert f"| {int(cells[0]):,} {name} | {core} s | {wall} s | {result} MB | {memory} MB |" in page
+    taken = dict(re.findall(r"(\w+) ([\d.]+ s and \d+ MB)", merged))
+    assert all(taken[kind] in page.replace("\n", " ") for kind in ("npz", "parquet", "zarr"))
+
+
+def test_work_of_contacts_is_stored() -> None:
+    """Errors and times of docs/contact.md, to the digits that it shows."""
+    page = (ROOT / "docs" / "contact.md").read_text(encoding="utf-8")
+    programs = ("symdyn, switches located", "symdyn, time stepping", "MuJoCo", "Exudyn")
+    points: dict[tuple[str, str], set[str]] = {}
+    for line in stored("contacts"):
+        if len(cells := re.split(r"\s{2,}", line.strip())) == 5 and cells[1] in programs:
+            error, ms = float(cells[3]), float(f"{float(cells[4]):.2g}")
+            points.setdefault((cells[0], cells[1]), set()).add(f"{error:.0e} in {ms:g} ms".replace("e-0", "e-"))
+    rows = {name: re.search(rf"^\| {name}.* \|$", page, re.MULTILINE) for name in ("ball that", "oscillator with", "billiard")}
+    shown = 0
+    for name, row in rows.items():
+        assert row is not None
+        for program, cell in zip(programs, row[0].split("|")[2:6], strict=True):
+            for point in re.findall(r"\S+ in \S+ ms", cell):
+                assert point in points[name.split()[0], program], (name, program, point)
+                shown += 1
+    assert shown == 17
+
+
 def texts_of(module: Path) -> Iterator[str]:
     """The texts in a module's code, values within them as "..."."""
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):

@@ -274,6 +274,19 @@ def test_a_step_of_the_walk_that_fails_is_reported(tmp_path: Path) -> None:
     assert walk.tried("page", f"{sys.executable} -c 'print(1)'", tmp_path).end == "done"
 
 
+def test_parts_that_are_walked_again_take_the_place_of_their_rows() -> None:
+    """Rows of other parts stay with their day; those of pages that are gone, and commands that are no longer printed, go."""
+    old = [walk.Step(name, 1.0, "done", "2026-01-01") for name in (
+        "README: python3 -m venv .venv", "a: 2 blocks", "b: 1 block", "gone: 3 blocks", "symdyn list", "symdyn demo")]
+    new = [walk.Step("README: python3 -m venv .venv", 2.0, "done", "2026-02-01"),
+           walk.Step("b: 2 blocks", 2.0, "done", "2026-02-01"),
+           walk.Step("symdyn list", None, "left out: it is long", "2026-02-01")]
+    assert [walk.step_of(step.line) for step in old + new] == old + new
+    both = walk.put_in(old, new, ["a", "b", walk.SHELL])
+    assert both == [new[0], old[1], new[1], new[2]]
+    assert walk.summary(both) == "3 done, 0 failed, 1 left out; 5 minutes in all"
+
+
 def test_links_within_the_site_lead_somewhere(site: Path) -> None:
     """Every address of a page and every part that it names are there."""
     pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html") if "_static" not in page.parts}
