@@ -198,7 +198,7 @@ def main(site: Path, only: Collection[str]) -> int:
     if only:
         result = json.loads(STORED.read_text(encoding="utf-8"))
         rows = put_in([step_of(line) for line in result["lines"][1:-1]], steps, parts(site))
-        result["lines"] = [HEAD, *(one.line for one in rows), summary(rows)]
+        result["lines"] = [HEAD, *(one.line for one in rows), f"{summary(rows)}; walked again: {', '.join(only)}"]
         STORED.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return int(any(one.end.startswith("FAILED") for one in steps))
 
