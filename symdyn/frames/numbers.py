@@ -32,6 +32,12 @@ def numbers(value: Scalar | sp.MatrixBase, values: Motions | None = None, t: Tim
     array t a number is a constant motion, with rate 0; at one instant its rate is a value of its own.
     Raises ArgumentError, listing all faults, for missing values, values that are no finite numbers, and a bad t;
     EvaluationError where the result is not finite.
+
+    >>> q = sd.coordinates("q")
+    >>> sd.frames.numbers(sp.Matrix([sp.cos(q), q.dot]), {q: 0.0, q.dot: 2.0})
+    array([1., 2.])
+    >>> sd.frames.numbers(3 * sd.t, t=[0.0, 0.5, 1.0])
+    array([0. , 1.5, 3. ])
     """
     entries, shape = _entries(value)
     times, over_time = _times(t)

@@ -40,18 +40,37 @@ class _Parts:
 
     @property
     def total(self) -> Array:
-        """The sum of the parts."""
+        """The sum of the parts.
+
+        >>> q = sd.coordinates("q")
+        >>> n = sd.Frame("n")
+        >>> b = n.frame("b", sd.rotation.about("Z", q))
+        >>> b.point("P", [1, 0, 0]).velocity_parts(components=b).total.T
+        Matrix([[0, q_dot, 0]])
+        """
         first, *others = self._named().values()
         for other in others:
             first = first + other
         return first
 
     def subs(self, *args: Any, **options: Any) -> Self:
-        """The same with symbols replaced, as SymPy's subs."""
+        """The same with symbols replaced, as SymPy's subs.
+
+        >>> q, l = sd.coordinates("q"), sd.parameters("l")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", q))
+        >>> b.point("P", [l, 0, 0]).velocity_parts(components=b).subs(l, 2).transport.T
+        Matrix([[0, 2*q_dot, 0]])
+        """
         return replace(self, **{name: part.subs(*args, **options) for name, part in self._named().items()})
 
     def at(self, values: Motions | None = None, t: Times | None = None) -> Self:
-        """The same in numbers: arrays (3,), or (n_t, 3) at an array of times; values, t and errors as for `numbers`."""
+        """The same in numbers: arrays (3,), or (n_t, 3) at an array of times; values, t and errors as for `numbers`.
+
+        >>> q = sd.coordinates("q")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", q))
+        >>> b.point("P", [1, 0, 0]).velocity_parts(components=b).at({q: 0.0, q.dot: 3.0}).transport
+        array([0., 3., 0.])
+        """
         found: dict[str, Any] = {name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()}
         return replace(self, **found)
 
@@ -81,6 +100,15 @@ class VelocityParts(_Parts):
     origin      velocity of the moving frame's origin
     relative    velocity seen from the moving frame
     transport   omega x r
+
+    >>> s, phi = sd.coordinates("s phi")
+    >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+    >>> b.point("P", [s, 0, 0]).velocity_parts(components=b)
+    velocity of P seen from n, by way of b, components in b
+      origin      [0, 0, 0]
+      relative    [s_dot, 0, 0]
+      transport   [0, s*phi_dot, 0]
+      total       [s_dot, s*phi_dot, 0]
     """
 
     origin: Array
@@ -100,6 +128,17 @@ class AccelerationParts(_Parts):
     euler         alpha x r
     centripetal   omega x (omega x r)
     coriolis      2 omega x v_rel
+
+    >>> s, phi = sd.coordinates("s phi")
+    >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+    >>> b.point("P", [s, 0, 0]).acceleration_parts(components=b)
+    acceleration of P seen from n, by way of b, components in b
+      origin      [0, 0, 0]
+      relative    [s_ddot, 0, 0]
+      euler       [0, s*phi_ddot, 0]
+      centripetal [-s*phi_dot**2, 0, 0]
+      coriolis    [0, 2*phi_dot*s_dot, 0]
+      total       [-s*phi_dot**2 + s_ddot, s*phi_ddot + 2*phi_dot*s_dot, 0]
     """
 
     origin: Array
@@ -121,6 +160,17 @@ class InertialForces(_Parts):
     euler         -m alpha x r
     centrifugal   -m omega x (omega x r)
     coriolis      -2 m omega x v_rel
+
+    >>> s, phi = sd.coordinates("s phi")
+    >>> m = sd.parameters("m")
+    >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+    >>> b.point("P", [s, 0, 0]).inertial_forces(m)
+    inertial forces on P felt in b, inertial is n, components in b
+      origin      [0, 0, 0]
+      euler       [0, -m*s*phi_ddot, 0]
+      centrifugal [m*s*phi_dot**2, 0, 0]
+      coriolis    [0, -2*m*phi_dot*s_dot, 0]
+      total       [m*s*phi_dot**2, -m*(s*phi_ddot + 2*phi_dot*s_dot), 0]
     """
 
     origin: Array

@@ -31,6 +31,12 @@ class Point:
     whose axes the result is given (default: seen_from). All raise ArgumentError for frames of different trees, and ModelError
     where a rate has no symbol (that of an input, a third derivative).
     Source: lecture, chapters 1.5 to 1.8.
+
+    >>> q = sd.coordinates("q")
+    >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", q))
+    >>> tip = b.point("tip", [2, 0, 0])
+    >>> tip.frame, tip.given.T
+    (Frame('b', in 'n'), Matrix([[2, 0, 0]]))
     """
 
     def __init__(self, name: str, frame: Axes, at: Components) -> None:
@@ -46,6 +52,11 @@ class Point:
 
         of           a frame (default: the first of the tree) or a Point
         components   default: `of`, or the frame in which that point is given
+
+        >>> n = sd.Frame("n")
+        >>> a, b = n.point("A", [1, 0, 0]), n.frame("b", origin=[0, 2, 0]).point("B", [0, 0, 3])
+        >>> b.position().T, b.position(of=a).T
+        (Matrix([[0, 2, 3]]), Matrix([[-1, 2, 3]]))
         """
         of = self.frame.path[0] if of is None else of
         start = of.frame if isinstance(of, Point) else of
@@ -56,11 +67,23 @@ class Point:
         return sp.Matrix(result)
 
     def velocity(self, seen_from: Axes | None = None, components: Axes | None = None) -> sp.Matrix:
-        """The rate of its position in a frame, seen from that frame, (3, 1), m/s."""
+        """The rate of its position in a frame, seen from that frame, (3, 1), m/s.
+
+        >>> q = sd.coordinates("q")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", q))
+        >>> b.point("P", [2, 0, 0]).velocity(components=b).T
+        Matrix([[0, 2*q_dot, 0]])
+        """
         return sp.Matrix(self._motion(seen_from, components, 1)[1])
 
     def acceleration(self, seen_from: Axes | None = None, components: Axes | None = None) -> sp.Matrix:
-        """The second rate of its position in a frame, seen from that frame, (3, 1), m/s^2."""
+        """The second rate of its position in a frame, seen from that frame, (3, 1), m/s^2.
+
+        >>> q = sd.coordinates("q")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", q))
+        >>> b.point("P", [2, 0, 0]).acceleration(components=b).T
+        Matrix([[-2*q_dot**2, 2*q_ddot, 0]])
+        """
         return sp.Matrix(self._motion(seen_from, components, 2)[2])
 
     def velocity_parts(self, through: Axes | None = None, seen_from: Axes | None = None,
@@ -68,6 +91,12 @@ class Point:
         """Its velocity as that of a moving frame's origin, omega x r, and what is seen from that frame; m/s.
 
         through   the moving frame b; default: the frame in which the point is given
+
+        >>> s, phi = sd.coordinates("s phi")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+        >>> parts = b.point("P", [s, 0, 0]).velocity_parts(components=b)
+        >>> parts.relative.T, parts.transport.T
+        (Matrix([[s_dot, 0, 0]]), Matrix([[0, s*phi_dot, 0]]))
         """
         through, seen_from, components = self._through(through, seen_from, components)
         r, v_rel = self._motion(through, components, 1)
@@ -84,6 +113,11 @@ class Point:
 
         through   the moving frame b; default: the frame in which the point is given
         Source: lecture, chapter 1.7.
+
+        >>> s, phi = sd.coordinates("s phi")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+        >>> b.point("P", [s, 0, 0]).acceleration_parts(components=b).coriolis.T
+        Matrix([[0, 2*phi_dot*s_dot, 0]])
         """
         through, seen_from, components = self._through(through, seen_from, components)
         r, v_rel, a_rel = self._motion(through, components, 2)
@@ -103,6 +137,11 @@ class Point:
         components   default: frame
         inertial     the frame in which Newton's law holds; default: the first of the tree
         Source: lecture, chapters 1.2 and 1.7.
+
+        >>> s, phi = sd.coordinates("s phi")
+        >>> b = sd.Frame("n").frame("b", sd.rotation.about("Z", phi))
+        >>> b.point("P", [s, 0, 0]).inertial_forces(mass=2).centrifugal.T
+        Matrix([[2*s*phi_dot**2, 0, 0]])
         """
         m = taken("mass", mass)
         frame = self.frame if frame is None else frame
@@ -118,6 +157,13 @@ class Point:
         values     symbol or name -> number, expression in sd.t, or function of t; see `numbers`
         quantity   "position", "velocity" (m/s) or "acceleration" (m/s^2)
         Raises ArgumentError for missing values and EvaluationError where a value is not finite.
+
+        >>> n = sd.Frame("n")
+        >>> b = n.frame("b", sd.rotation.about("Z", sp.pi * sd.t))
+        >>> np.round(b.point("P", [1, 0, 0]).path(n, t=[0.0, 0.5, 1.0]), 12) + 0.0
+        array([[ 1.,  0.,  0.],
+               [ 0.,  1.,  0.],
+               [-1.,  0.,  0.]])
         """
         if quantity not in _ORDERS:
             raise ArgumentError(f"quantity is {shown(quantity)}; pass {', '.join(map(repr, _ORDERS))}")

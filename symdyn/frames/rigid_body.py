@@ -21,7 +21,11 @@ if TYPE_CHECKING:
 
 
 class ForceSystem(NamedTuple):
-    """A force (3,), N, at a point, and the moment about it (3,), N m."""
+    """A force (3,), N, at a point, and the moment about it (3,), N m.
+
+    >>> sd.frames.equivalent_force_system([10.0, 0.0, 0.0], r=[0.0, 2.0, 0.0]).force
+    array([10.,  0.,  0.])
+    """
 
     force: Any
     moment: Any
@@ -37,6 +41,11 @@ def inertia_about(I_G: Matrix, mass: Scalar, r: Components) -> Array:
     r      (3,) from O to G, or from G to O, m
     Raises ArgumentError, listing all faults, for an inertia that is not symmetric or that no body has, and wrong shapes.
     Source: lecture, chapter 2.2.
+
+    >>> sd.frames.inertia_about([0.1, 0.2, 0.2], 2.0, [1.0, 0.0, 0.0])
+    array([[0.1, 0. , 0. ],
+           [0. , 2.2, 0. ],
+           [0. , 0. , 2.2]])
     """
     take = Quantities("inertia_about")
     I, m, r = take.inertia("I_G", I_G), take.mass(mass), take.vector("r", r)
@@ -48,6 +57,13 @@ def inertia_about_com(I_O: Matrix, mass: Scalar, r: Components) -> Array:
     """The inertia about the centre of mass G from that about O: I_G = I_O - m (r.r 1 - r r^T), (3, 3), kg m^2.
 
     Arguments and errors as for `inertia_about`; also where what is left is the inertia of no body, because r is too long.
+
+    >>> m, l = sd.parameters("m l")
+    >>> sd.frames.inertia_about_com(sp.diag(0, m * l**2 / 3, m * l**2 / 3), m, [l / 2, 0, 0])
+    Matrix([
+    [0,         0,         0],
+    [0, l**2*m/12,         0],
+    [0,         0, l**2*m/12]])
     """
     take = Quantities("inertia_about_com")
     I, m, r = take.inertia("I_O", I_O), take.mass(mass), take.vector("r", r)
@@ -63,6 +79,11 @@ def rotated_inertia(R: Matrix, I: Matrix) -> Array:
 
     Raises NotARotation with numbers if R is no rotation, ArgumentError for faults of I.
     Source: lecture, chapter 2.1.
+
+    >>> np.round(sd.frames.rotated_inertia(sd.rotation.about("Z", np.pi / 2), [1.0, 2.0, 3.0]), 12) + 0.0
+    array([[2., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 3.]])
     """
     take = Quantities("rotated_inertia")
     R, I = take.rotation(R), take.inertia("I", I)
@@ -77,6 +98,11 @@ def point_inertia(masses: Sequence[Scalar], positions: Sequence[Components]) -> 
     positions   (n, 3) m
     Raises ArgumentError for lists of different lengths and wrong shapes.
     Source: lecture, chapters 2.1 and 2.2.
+
+    >>> sd.frames.point_inertia([1.0, 2.0], [[1, 0, 0], [0, 1, 0]])
+    array([[2., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 3.]])
     """
     take = Quantities("point_inertia")
     particles = take.particles(masses, positions)
@@ -85,7 +111,11 @@ def point_inertia(masses: Sequence[Scalar], positions: Sequence[Components]) -> 
 
 
 def center_of_mass(masses: Sequence[Scalar], positions: Sequence[Components]) -> Array:
-    """sum m r / sum m, (3,), m; arguments and errors as for `point_inertia`, and ArgumentError for masses that add up to 0."""
+    """sum m r / sum m, (3,), m; arguments and errors as for `point_inertia`, and ArgumentError for masses that add up to 0.
+
+    >>> sd.frames.center_of_mass([1.0, 3.0], [[0, 0, 0], [4, 0, 0]])
+    array([3., 0., 0.])
+    """
     take = Quantities("center_of_mass")
     particles = take.particles(masses, positions)
     total = sp.Add(*[m for m, _ in particles])
@@ -108,6 +138,9 @@ def angular_momentum(inertia: Matrix, omega: Components, mass: Scalar = 0, r_G: 
     velocity   (3,) v_O, m/s
     Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
+
+    >>> sd.frames.angular_momentum([1.0, 2.0, 3.0], omega=[0.5, 0.0, 2.0])
+    array([0.5, 0. , 6. ])
     """
     take = Quantities("angular_momentum")
     I, w, m = take.inertia("inertia", inertia), take.vector("omega", omega), take.mass(mass)
@@ -122,6 +155,9 @@ def kinetic_energy(mass: Scalar, inertia: Matrix, velocity: Components, omega: C
     inertia, velocity   I_O (3, 3) and v_O (3,) of one point O of the body; r_G (3,) from there to the centre of mass
     Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
+
+    >>> sd.frames.kinetic_energy(2.0, [1.0, 2.0, 3.0], velocity=[3.0, 0.0, 0.0], omega=[0.0, 0.0, 2.0])
+    15.0
     """
     take = Quantities("kinetic_energy")
     m, I = take.mass(mass), take.inertia("inertia", inertia)
@@ -146,6 +182,11 @@ def moment_equation(inertia: Matrix, omega: Components, alpha: Components, mass:
     acceleration   (3,) a_O seen from the inertial frame, m/s^2
     Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
+
+    >>> p, q, r = sp.symbols("p q r")
+    >>> A, B, C = sd.parameters("A B C")
+    >>> sd.frames.moment_equation(sp.diag(A, B, C), [p, q, r], [0, 0, 0]).T
+    Matrix([[-B*q*r + C*q*r, A*p*r - C*p*r, -A*p*q + B*p*q]])
     """
     take = Quantities("moment_equation")
     I, w, w_rate = take.inertia("inertia", inertia), take.vector("omega", omega), take.vector("alpha", alpha)
@@ -160,6 +201,9 @@ def force_equation(mass: Scalar, acceleration: Components, omega: Components = (
 
     Arguments as for `moment_equation`; O = G if r_G is left out. Raises ArgumentError, listing all faults.
     Source: lecture, chapters 2.1 and 2.2.
+
+    >>> sd.frames.force_equation(2.0, [0.0, 0.0, 0.0], omega=[0.0, 0.0, 3.0], r_G=[0.5, 0.0, 0.0])
+    array([-9.,  0.,  0.])
     """
     take = Quantities("force_equation")
     m, a, w = take.mass(mass), take.vector("acceleration", acceleration), take.vector("omega", omega)
@@ -177,6 +221,9 @@ def planar_moment_equation(inertia: Scalar, alpha: Scalar, mass: Scalar = 0, r_G
     r_G, acceleration   (2,) from O to the centre of mass, m, and a_O seen from the inertial frame, m/s^2
     Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
+
+    >>> sd.frames.planar_moment_equation(0.5, alpha=4.0)
+    2.0
     """
     take = Quantities("planar_moment_equation")
     I, w_rate = take.scalar("inertia", inertia, least=0, unit="kg m^2"), take.scalar("alpha", alpha)
@@ -191,6 +238,9 @@ def planar_force_equation(mass: Scalar, acceleration: Components, omega: Scalar 
 
     Arguments as for `planar_moment_equation`; omega rad/s. Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
+
+    >>> sd.frames.planar_force_equation(2.0, [0.0, 0.0], omega=3.0, r_G=[0.5, 0.0])
+    array([-9.,  0.])
     """
     take = Quantities("planar_force_equation")
     m, a = take.mass(mass), take.vector("acceleration", acceleration, 2)
@@ -207,6 +257,9 @@ def equivalent_force_system(force: Components, r: Components, moment: Components
     moment   (3,) about P, N m
     Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
+
+    >>> sd.frames.equivalent_force_system([10.0, 0.0, 0.0], r=[0.0, 2.0, 0.0]).moment
+    array([  0.,   0., -20.])
     """
     take = Quantities("equivalent_force_system")
     F, r, M = take.vector("force", force), take.vector("r", r), take.vector("moment", moment)

@@ -9,7 +9,12 @@ LONGEST = 1500
 
 
 def tidy(vector: sp.MatrixBase) -> sp.Matrix:
-    """Each entry multiplied out with sin^2 + cos^2 = 1, where that is shorter; equal to the one given."""
+    """Each entry multiplied out with sin^2 + cos^2 = 1, where that is shorter; equal to the one given.
+
+    >>> a, b = sp.symbols("a b")
+    >>> sd.frames.tidy(sp.Matrix([b * sp.sin(a) ** 2 + b * sp.cos(a) ** 2]))
+    Matrix([[b]])
+    """
     return sp.Matrix(*vector.shape, [_entry(e) for e in vector])
 
 

@@ -41,6 +41,12 @@ class EulerSolutions(Sequence[Any]):
     sign, value   at lock, what is fixed: first angle + sign * third angle = value, modulo 2 pi; None (nan) otherwise
     R          the rotation
     With leading axes of R every field but `sequence` is an array with them.
+
+    >>> found = sd.rotation.to_euler(sd.rotation.from_euler("ZYX", [0.3, -0.2, 0.1]), "ZYX")
+    >>> np.round(found.angles, 6), np.round(found.other, 6), found.locked
+    (array([ 0.3, -0.2,  0.1]), array([-2.841593, -2.941593, -3.041593]), False)
+    >>> round(float(found.distance), 6)
+    1.370796
     """
 
     sequence: str
@@ -116,6 +122,10 @@ def to_euler(R: Matrix, sequence: str) -> EulerSolutions:
 
     Raises NotARotation if |R^T R - 1| of numbers has an entry above 1e-9, det R < 0, or R is not (3, 3); ArgumentError for
     an unknown sequence. Source: lecture, chapter 4.3.
+
+    >>> R = sd.rotation.about("Z", 0.3) @ sd.rotation.about("X", 0.1)
+    >>> np.round(sd.rotation.to_euler(R, "ZXZ").angles, 6) + 0.0
+    array([0.3, 0.1, 0. ])
     """
     of, algebra = sequence_of(sequence), algebra_of(R)
     R = rotation_matrix(algebra, R)

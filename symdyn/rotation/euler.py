@@ -27,6 +27,15 @@ def from_euler(sequence: str, angles: Vector) -> Array:
     sequence   one of the twelve, "ZYX" is yaw, pitch, roll
     angles     (3,), rad, in the order of the sequence; numbers may have leading axes (..., 3)
     Raises ArgumentError for an unknown sequence and for anything but three angles. Source: lecture, chapter 4.2.
+
+    >>> a = sp.Symbol("a", real=True)
+    >>> sd.rotation.from_euler("ZYX", [a, 0, 0])
+    Matrix([
+    [cos(a), -sin(a), 0],
+    [sin(a),  cos(a), 0],
+    [     0,       0, 1]])
+    >>> np.round(sd.rotation.from_euler("ZYX", [np.pi / 2, 0.0, 0.0]) @ [1.0, 0.0, 0.0], 12) + 0.0
+    array([0., 1., 0.])
     """
     of, algebra = sequence_of(sequence), algebra_of(angles)
     R_1, R_2, R_3 = _turns(algebra, of, algebra.read(angles, (3,), "the Euler angles"))
@@ -39,6 +48,13 @@ def euler_rates(sequence: str, angles: Vector, frame: str = "n") -> Array:
     frame   the components of omega: "n" or "b"
     Numbers may have leading axes. The columns are the axes of the three rotations, of which the first and third become
     parallel at gimbal lock. Raises ArgumentError. Source: lecture, chapter 4.2.
+
+    >>> a, b, c = sp.symbols("a b c", real=True)
+    >>> sd.rotation.euler_rates("ZYX", [a, b, c], frame="b")
+    Matrix([
+    [      -sin(b),       0, 1],
+    [sin(c)*cos(b),  cos(c), 0],
+    [cos(b)*cos(c), -sin(c), 0]])
     """
     of, algebra = sequence_of(sequence), algebra_of(angles)
     in_n = frame_of(frame)
@@ -56,6 +72,11 @@ def euler_rates_inverse(sequence: str, angles: Vector, frame: str = "n") -> Arra
 
     Raises GimbalLock where the sine (proper sequences) or cosine (Tait-Bryan) of the second angle is below 1e-8 in numbers,
     or zero for all values of the symbols. Source: lecture, chapter 4.3.
+
+    >>> angles = [0.3, -0.2, 0.1]
+    >>> rates = sd.rotation.euler_rates_inverse("ZYX", angles) @ [0.0, 0.0, 2.0]
+    >>> np.round(sd.rotation.euler_rates("ZYX", angles) @ rates, 12) + 0.0
+    array([0., 0., 2.])
     """
     of, algebra = sequence_of(sequence), algebra_of(angles)
     in_n = frame_of(frame)

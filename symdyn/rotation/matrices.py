@@ -31,6 +31,15 @@ def about(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
 
     Raises ZeroAxis for a vector of length zero, NotNormalized for numbers with unit=True whose length is not 1 to 1e-9,
     ArgumentError for anything else that is no axis or no angle. Source: lecture, chapters 1.6 and 4.4.
+
+    >>> phi = sp.Symbol("phi", real=True)
+    >>> sd.rotation.about("Z", phi)
+    Matrix([
+    [cos(phi), -sin(phi), 0],
+    [sin(phi),  cos(phi), 0],
+    [       0,         0, 1]])
+    >>> np.round(sd.rotation.about([1, 1, 1], 2 * np.pi / 3) @ [1.0, 0.0, 0.0], 12) + 0.0
+    array([0., 1., 0.])
     """
     number = axis_number(axis)
     algebra = algebra_of(angle) if number is not None else algebra_of(axis, angle)
@@ -48,7 +57,11 @@ def about(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
 
 
 def from_axis_angle(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
-    """R (3, 3) from axis and angle, rad: the same as about(axis, angle)."""
+    """R (3, 3) from axis and angle, rad: the same as about(axis, angle).
+
+    >>> bool((sd.rotation.from_axis_angle([0, 3, 4], 0.5) == sd.rotation.about([0, 3, 4], 0.5)).all())
+    True
+    """
     return about(axis, angle, unit=unit)
 
 
@@ -110,7 +123,13 @@ def norm(v: np.ndarray) -> np.ndarray:
 
 
 def skew(v: Vector) -> Array:
-    """S (3, 3) with S a = v x a; numbers may have leading axes. Raises ArgumentError for anything but three components."""
+    """S (3, 3) with S a = v x a; numbers may have leading axes. Raises ArgumentError for anything but three components.
+
+    >>> sd.rotation.skew([1.0, 2.0, 3.0]) @ [4.0, 5.0, 6.0]
+    array([-3.,  6., -3.])
+    >>> np.cross([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
+    array([-3.,  6., -3.])
+    """
     algebra = algebra_of(v)
     x, y, z = algebra.components(algebra.read(v, (3,), "the vector"))
     return algebra.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -121,6 +140,9 @@ def vee(S: Matrix) -> Array:
 
     Raises ArgumentError if numbers are not skew-symmetric to 1e-9 of their size. Of expressions with symbols this is not
     checked: entries (3, 2), (1, 3) and (2, 1) are taken.
+
+    >>> sd.rotation.vee(sd.rotation.skew([1.0, 2.0, 3.0]))
+    array([1., 2., 3.])
     """
     algebra = algebra_of(S)
     rows = algebra.entries(algebra.read(S, (3, 3), "the skew-symmetric matrix"))
@@ -142,6 +164,10 @@ def infinitesimal(delta: Vector) -> Array:
 
     Small rotations add and commute; the error is of second order, so that the matrix is no rotation, only near one.
     Source: lecture, chapter 4.3.
+
+    >>> small = [0.0, 0.0, 1e-4]
+    >>> bool(np.abs(sd.rotation.infinitesimal(small) - sd.rotation.about("Z", 1e-4)).max() < 1e-8)
+    True
     """
     algebra = algebra_of(delta)
     x, y, z = algebra.components(algebra.read(delta, (3,), "the small rotation"))

@@ -19,14 +19,28 @@ if TYPE_CHECKING:
 
 
 def E(p: Vector) -> Array:
-    """E (3, 4) of any four numbers: R = E E_bar^T, omega in n-components is 2 E p_dot. Source: lecture, chapter 4.5."""
+    """E (3, 4) of any four numbers: R = E E_bar^T, omega in n-components is 2 E p_dot. Source: lecture, chapter 4.5.
+
+    >>> p = [0.5, 0.5, 0.5, 0.5]
+    >>> sd.rotation.E(p) @ sd.rotation.E_bar(p).T
+    array([[0., 0., 1.],
+           [1., 0., 0.],
+           [0., 1., 0.]])
+    """
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(algebra.read(p, (4,), "p"))
     return algebra.matrix([[-e1, e0, -e3, e2], [-e2, e3, e0, -e1], [-e3, -e2, e1, e0]])
 
 
 def E_bar(p: Vector) -> Array:
-    """E_bar (3, 4) of any four numbers: R = E E_bar^T, omega in b-components is 2 E_bar p_dot. Source: lecture, chapter 4.5."""
+    """E_bar (3, 4) of any four numbers: R = E E_bar^T, omega in b-components is 2 E_bar p_dot. Source: lecture, chapter 4.5.
+
+    >>> sd.rotation.E_bar(sp.symbols("e0:4"))
+    Matrix([
+    [-e1,  e0,  e3, -e2],
+    [-e2, -e3,  e0,  e1],
+    [-e3,  e2, -e1,  e0]])
+    """
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(algebra.read(p, (4,), "p"))
     return algebra.matrix([[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]])
@@ -37,6 +51,11 @@ def from_parameters(p: Vector) -> Array:
 
     Numbers are divided by their norm, so that R is a rotation to the last digit; symbols are taken to be of norm 1.
     Raises NotNormalized if the norm of numbers is not 1 to 1e-9. Source: lecture, chapter 4.5.
+
+    >>> sd.rotation.from_parameters([0.5, 0.5, 0.5, 0.5])
+    array([[0., 0., 1.],
+           [1., 0., 0.],
+           [0., 1., 0.]])
     """
     algebra = algebra_of(p)
     p = _kept(algebra, unit_parameters(algebra, p))
@@ -52,6 +71,9 @@ def to_parameters(R: Matrix) -> Array:
     another component).
     Raises NotARotation if |R^T R - 1| of numbers has an entry above 1e-9, det R < 0, or R is not (3, 3).
     Source: lecture, chapter 4.5.
+
+    >>> sd.rotation.to_parameters([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    array([0.5, 0.5, 0.5, 0.5])
     """
     algebra = algebra_of(R)
     R = rotation_matrix(algebra, R)
@@ -70,6 +92,11 @@ def compose(p: Vector, r: Vector) -> Array:
     """Euler parameters (4,) of the product of two rotations: R(compose(p, r)) = R(p) R(r).
 
     The norm of numbers is kept at 1; they may have leading axes. Raises NotNormalized.
+
+    >>> p, r = (sd.rotation.parameters_of_axis_angle("Z", angle) for angle in (0.3, 0.4))
+    >>> axis, angle = sd.rotation.axis_angle_of_parameters(sd.rotation.compose(p, r))
+    >>> axis, round(float(angle), 12)
+    (array([0., 0., 1.]), 0.7)
     """
     algebra = algebra_of(p, r)
     p, r = unit_parameters(algebra, p), unit_parameters(algebra, r)
@@ -80,14 +107,23 @@ def compose(p: Vector, r: Vector) -> Array:
 
 
 def inverse(p: Vector) -> Array:
-    """Euler parameters (4,) of the inverse rotation: theta0 and the others with a minus. Raises NotNormalized."""
+    """Euler parameters (4,) of the inverse rotation: theta0 and the others with a minus. Raises NotNormalized.
+
+    >>> p = sd.rotation.parameters_of_axis_angle([1, 2, 2], 0.3)
+    >>> np.round(sd.rotation.compose(p, sd.rotation.inverse(p)), 12) + 0.0
+    array([1., 0., 0., 0.])
+    """
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(unit_parameters(algebra, p))
     return algebra.vector([e0, -e1, -e2, -e3])
 
 
 def normalized(p: Vector) -> Array:
-    """p (4,) divided by its norm; numbers may have leading axes. Raises NotNormalized for zero, which has no direction."""
+    """p (4,) divided by its norm; numbers may have leading axes. Raises NotNormalized for zero, which has no direction.
+
+    >>> sd.rotation.normalized([3.0, 0.0, 4.0, 0.0])
+    array([0.6, 0. , 0.8, 0. ])
+    """
     algebra = algebra_of(p)
     p = algebra.read(p, (4,), "p")
     zero = "the Euler parameters are (0, 0, 0, 0), which have no direction; pass four numbers that are not all zero"
@@ -107,6 +143,9 @@ def omega_from_parameters(p: Vector, pd: Vector, frame: str = "n") -> Array:
 
     p, pd   (4,); what of pd is along p, which would change the norm, has no effect; numbers may have leading axes
     Raises NotNormalized. Source: lecture, chapter 4.5.
+
+    >>> sd.rotation.omega_from_parameters([1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.25])
+    array([0. , 0. , 0.5])
     """
     algebra, in_n = algebra_of(p, pd), frame_of(frame)
     p, pd = unit_parameters(algebra, p), algebra.read(pd, (4,), "p_dot")
@@ -117,6 +156,9 @@ def parameters_rate(p: Vector, omega: Vector, frame: str = "n") -> Array:
     """p_dot (4,) = E^T omega / 2 of omega (3,) in n-components, E_bar^T omega / 2 in b-components; the norm of p stays.
 
     Numbers may have leading axes. Raises NotNormalized. Source: lecture, chapter 4.5.
+
+    >>> sd.rotation.parameters_rate([1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.5])
+    array([0.  , 0.  , 0.  , 0.25])
     """
     algebra, in_n = algebra_of(p, omega), frame_of(frame)
     p, omega = unit_parameters(algebra, p), algebra.read(omega, (3,), "omega")
@@ -127,6 +169,9 @@ def parameters_of_axis_angle(axis: Axis, angle: Angle, *, unit: bool = False) ->
     """Euler parameters (4,) = (cos(angle / 2), a sin(angle / 2)); axis, angle and unit as for about.
 
     An angle beyond pi or below -pi gives a negative theta0. Raises ZeroAxis. Source: lecture, chapter 4.5.
+
+    >>> np.round(sd.rotation.parameters_of_axis_angle("Z", np.pi / 3), 6)
+    array([0.866025, 0.      , 0.      , 0.5     ])
     """
     algebra = algebra_of(angle) if axis_number(axis) is not None else algebra_of(axis, angle)
     x, y, z = algebra.components(unit_axis(algebra, axis, unit))

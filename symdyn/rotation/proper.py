@@ -47,6 +47,12 @@ def nearest(R: Matrix) -> Array:
 
     Numbers may have leading axes; a SymPy matrix of numbers gives SymPy floats.
     Raises NotARotation if the determinant is not positive, where no rotation is near, or there are symbols.
+
+    >>> measured = [[0.0, -1.001, 0.0], [0.999, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> np.round(sd.rotation.nearest(measured), 12) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
     """
     algebra = algebra_of(R)
     R = algebra.read(R, (3, 3), "R", NotARotation)

@@ -20,6 +20,9 @@ class Lock(NamedTuple):
     sequence   its name
     second     the two values of the second angle in (-pi, pi], rad, SymPy numbers
     fixed      what is fixed at each: the sum or the difference of the first and third angle
+
+    >>> sd.rotation.gimbal_lock("ZXZ").second
+    (0, pi)
     """
 
     sequence: str
@@ -89,6 +92,9 @@ def gimbal_lock(sequence: str) -> Lock:
     At these angles the first and third axis are parallel: R depends on the sum or the difference of the two angles alone,
     and G has no inverse. Tait-Bryan sequences lock at -pi/2 and pi/2, proper ones at 0 and pi.
     Raises ArgumentError for anything but one of the twelve sequences. Source: lecture, chapter 4.3.
+
+    >>> sd.rotation.gimbal_lock("ZYX")
+    ZYX locks at theta = -pi/2, where only psi + phi is fixed and at theta = pi/2, where only psi - phi is fixed
     """
     of = sequence_of(sequence)
     if of.proper:

@@ -23,6 +23,10 @@ class AxisAngle(NamedTuple):
     """An axis (3,) of length 1, whose components in n and b are the same, and an angle, rad, in [0, pi].
 
     `.note` says what is arbitrary: the axis at angle 0, its sign at angle pi.
+
+    >>> turned = sd.rotation.axis_angle(sd.rotation.about("Y", 0.25))
+    >>> turned.axis, round(float(turned.angle), 12)
+    (array([0., 1., 0.]), 0.25)
     """
 
     axis: Any
@@ -57,6 +61,10 @@ def axis_angle(R: Matrix) -> AxisAngle:
     symmetric for all values of its symbols, the angle is 0 or pi.
     Raises NotARotation if |R^T R - 1| of numbers has an entry above 1e-9, det R < 0, or R is not (3, 3).
     Source: lecture, chapter 4.4.
+
+    >>> axis, angle = sd.rotation.axis_angle([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    >>> np.round(axis * np.sqrt(3), 12), round(float(np.degrees(angle)), 9)
+    (array([1., 1., 1.]), 120.0)
     """
     algebra = algebra_of(R)
     R = rotation_matrix(algebra, R)
@@ -78,6 +86,10 @@ def axis_angle_of_parameters(p: Vector) -> AxisAngle:
     Numbers may have leading axes. p and -p give the same. Expressions with symbols: angle 2 atan2(|v|, theta0) in [0, 2 pi]
     and axis v / |v|, v = (theta1, theta2, theta3).
     Raises NotNormalized. Source: lecture, chapter 4.5.
+
+    >>> axis, angle = sd.rotation.axis_angle_of_parameters([0.6, 0.0, 0.8, 0.0])
+    >>> axis, round(float(angle), 6)
+    (array([0., 1., 0.]), 1.85459)
     """
     algebra = algebra_of(p)
     p = unit_parameters(algebra, p)

@@ -33,6 +33,13 @@ def angular_velocity(R: Matrix, frame: str = "n", *, R_dot: Matrix | None = None
     Raises NotARotation for numbers that are no rotation, ArgumentError if R has accelerations or inputs, which have no
     derivative, numbers come without R_dot, or R_dot R^T of numbers is not skew-symmetric to 1e-6 of its size.
     Source: lecture, chapters 1.7 and 4.5.
+
+    >>> q = sd.coordinates("q")
+    >>> sd.rotation.angular_velocity(sd.rotation.about("X", q))
+    Matrix([
+    [q_dot],
+    [    0],
+    [    0]])
     """
     in_n = frame_of(frame)
     algebra = algebra_of(R) if R_dot is None else algebra_of(R, R_dot)
