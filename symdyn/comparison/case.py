@@ -219,6 +219,12 @@ class Case:
 
         Raises CaseError with every fault: what has a wrong type, names that `derived` lacks, no formulas, names used twice.
         What the functions of a formula raise later is a CaseError too.
+
+        >>> q = sp.Symbol("q")
+        >>> formula = sd.Formula("double angle", sp.sin(2 * q), 2 * sp.sin(q) * sp.cos(q))
+        >>> case = sd.Case("identity", slide="1.2", formulas=[formula])
+        >>> [(formula.name, str(formula.slide)) for formula in case.taken()]
+        [('double angle', '1.2')]
         """
         faults = text(self.name, "the name of a case") + text(self.title, "`title`", empty=True) + _slide(self.slide, "`slide`")
         faults += members(self.remarks, "`remarks`", Remark, "symdyn.Remark(why, line)")

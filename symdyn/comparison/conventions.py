@@ -23,6 +23,11 @@ class Convention:
     to_slide   takes an expression or a matrix (of an equation: left minus right), returns the same
 
     A case rejects a convention without name, sentence or function; what to_slide raises becomes a CaseError.
+
+    >>> q = sp.Symbol("q")
+    >>> degrees = sd.conventions.Convention("degrees", "The slide's angle is in degrees.", lambda derived: derived * 180 / sp.pi)
+    >>> degrees.to_slide(sp.pi / 2)
+    90
     """
 
     name: str
@@ -43,12 +48,30 @@ class Convention:
 
 
 def opposite_sign(sentence: str) -> Convention:
-    """The slide counts the other direction as positive."""
+    """The slide counts the other direction as positive.
+
+    >>> m, g, q = sp.symbols("m g q")
+    >>> turned = sd.conventions.opposite_sign("The slide counts torques clockwise.")
+    >>> formula = sd.Formula("torque", m * g * sp.sin(q), -m * g * sp.sin(q), conventions=turned)
+    >>> print(sd.compare(sd.Case("torques", formulas=[formula])))
+    torques
+      torque  1 equal up to a convention, proved
+          opposite sign: The slide counts torques clockwise.
+      1 entry: 1 equal up to a convention, proved
+    """
     return Convention("opposite sign", sentence, lambda derived: -derived)
 
 
 def transposed(sentence: str) -> Convention:
-    """The slide's rotation takes components the other way, or its vector is a row."""
+    """The slide's rotation takes components the other way, or its vector is a row.
+
+    >>> q = sp.Symbol("q")
+    >>> sd.conventions.transposed("The slide turns the axes.").to_slide(sd.rotation.about("Z", q))
+    Matrix([
+    [ cos(q), sin(q), 0],
+    [-sin(q), cos(q), 0],
+    [      0,      0, 1]])
+    """
     return Convention("transposed", sentence, lambda derived: _matrix(derived, "transposed").T)
 
 
@@ -56,6 +79,10 @@ def reordered(rows: Sequence[int] | None = None, columns: Sequence[int] | None =
     """The slide's row i is row rows[i] of symdyn's, its column j is columns[j]; each holds every index once.
 
     Raises CaseError without rows and columns, and when it is applied to a formula of another size.
+
+    >>> a, b = sp.symbols("a b")
+    >>> sd.conventions.reordered(rows=[1, 0], sentence="The slide begins with y.").to_slide(sp.Matrix([a, b])).T
+    Matrix([[b, a]])
     """
     if rows is None and columns is None:
         raise CaseError(["an order of coordinates has neither rows nor columns; pass rows=[...] or columns=[...]"])
@@ -68,7 +95,12 @@ def reordered(rows: Sequence[int] | None = None, columns: Sequence[int] | None =
 
 
 def other_point(value: Any, sentence: str) -> Convention:
-    """The slide refers to another point; value: what symdyn derives for that one."""
+    """The slide refers to another point; value: what symdyn derives for that one.
+
+    >>> m, l, I_O = sp.symbols("m l I_O")
+    >>> sd.conventions.other_point(I_O - m * l**2, "The slide's inertia is about G.").to_slide(I_O)
+    I_O - l**2*m
+    """
     return Convention("reference point", sentence, lambda _: value)
 
 
@@ -76,6 +108,10 @@ def scaled(factor: Any, sentence: str) -> Convention:
     """The slide's equation is multiplied by a factor that is not zero: a number or a SymPy expression.
 
     Raises CaseError for text, for what has no finite value, and for a factor that is zero everywhere.
+
+    >>> m, x = sp.symbols("m x")
+    >>> sd.conventions.scaled(1 / m, "The slide divides by m.").to_slide(m * x)
+    x
     """
     try:
         taken = as_expression(factor, "the common factor")

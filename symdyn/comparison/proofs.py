@@ -32,7 +32,14 @@ Entries = Sequence[tuple[int, ...]] | None
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a proof measured: the largest residual of the printed formula and of the right one, and whether that proves it."""
+    """What a proof measured: the largest residual of the printed formula and of the right one, and whether that proves it.
+
+    >>> q = sp.Symbol("q")
+    >>> proof = sd.proofs.other("sin 2q = 2 sin q cos q", sp.sin(2 * q))
+    >>> evidence = proof.check(2 * sp.sin(q), 2 * sp.sin(q) * sp.cos(q), {})
+    >>> evidence.holds, evidence.kind, evidence.right < 1e-40
+    (True, 'another formulation', True)
+    """
 
     kind: str
     sentence: str
@@ -66,6 +73,11 @@ class Proof:
     sentence   what is demanded of the formula
     residual   takes the formula as SymPy expression or matrix (of an equation: left minus right), in symdyn's symbols; returns
                an expression, a matrix or numbers
+
+    >>> q = sp.Symbol("q")
+    >>> even = sd.proofs.Proof("symmetry", "The formula is even in q.", lambda formula: formula - formula.subs(q, -q))
+    >>> even.check(sp.sin(q), sp.cos(q), {}).holds
+    True
     """
 
     kind: str
@@ -77,6 +89,11 @@ class Proof:
         entry by entry, that of every entry that is claimed to be wrong.
 
         Raises CaseError if the residual cannot be formed.
+
+        >>> q = sp.Symbol("q")
+        >>> proof = sd.proofs.limit("It vanishes at q = 0.", {q: 0}, 0)
+        >>> proof.check(printed=sp.cos(q), right=sp.sin(q), where={}).holds
+        True
         """
         moving = _names(printed) | _names(right)
         of_printed, of_right = (self._measured(formula, where, moving) for formula in (printed, right))
@@ -99,7 +116,13 @@ class Proof:
             raise CaseError([f"the proof {self.sentence!r} ended with {type(error).__name__}: {error}"]) from error
 
     def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
-        """Entry by entry; moving: names of the symbols of both formulas."""
+        """Entry by entry; moving: names of the symbols of both formulas.
+
+        >>> q = sp.Symbol("q")
+        >>> proof = sd.proofs.limit("It vanishes at q = 0.", {q: 0}, 0)
+        >>> [residual.size for residual in proof.measure(sp.cos(q), {}, {"q"})]
+        [1.0]
+        """
         residual = taken(self.residual(formula), "the residual")
         residual = residual.replaced(by_name(residual, where))
         same = canonical(residual.entries)
@@ -150,7 +173,13 @@ def _minus(formula: Any, value: Any, what: str) -> Any:
 
 
 def other(sentence: str, value: Scalar | Matrix) -> Proof:
-    """Another formulation gives `value`, of the formula's shape; or a function that returns it."""
+    """Another formulation gives `value`, of the formula's shape; or a function that returns it.
+
+    >>> m, l, g, q = sp.symbols("m l g q")
+    >>> proof = sd.proofs.other("Lagrange's equation", -m * g * l * sp.sin(q))
+    >>> proof.check(printed=-m * g * l, right=-m * g * l * sp.sin(q), where={}).holds
+    True
+    """
     return Proof("another formulation", sentence,
                  lambda formula: _minus(formula, value() if callable(value) else value, "what the other formulation gives"))
 
@@ -159,6 +188,11 @@ def limit(sentence: str, at: Named[Scalar], value: Scalar | Matrix) -> Proof:
     """With these values of symbols the formula must become `value`, of its shape.
 
     Raises CaseError for values that are no expressions.
+
+    >>> m, l, g, q = sp.symbols("m l g q")
+    >>> proof = sd.proofs.limit("It hangs at rest.", {q: 0}, 0)
+    >>> proof.check(printed=-m * g * l, right=-m * g * l * sp.sin(q), where={}).holds
+    True
     """
     faults: list[str] = []
     names = renaming(at, f"the limit {sentence!r}", faults)
@@ -181,6 +215,11 @@ def dimensions(sentence: str, units: Named[Sequence[float]], unit: Sequence[floa
 
     Symbols that are left out are pure numbers. Every unit is made smaller by a factor of its own, and the value must follow.
     Raises CaseError for units that are not three numbers.
+
+    >>> m, v = sp.symbols("m v")
+    >>> proof = sd.proofs.dimensions("It is an energy.", {m: (1, 0, 0), v: (0, 1, -1)}, (1, 2, -2))
+    >>> proof.check(printed=m * v / 2, right=m * v**2 / 2, where={}).holds
+    True
     """
     factors = (sp.Rational(7, 5), sp.Rational(11, 7), sp.Rational(5, 3))
     powers = {str(key): list(value) for key, value in units.items()}
@@ -216,6 +255,11 @@ def numeric_derivative(sentence: str, of: Any, order: int = 1) -> Proof:
     Symbols X, X_dot, X_ddot are a motion and its derivatives, t is the time; all others are constant.
     order   1 or 2
     Raises CaseError for another order, and if `of` is no formula.
+
+    >>> x, x_dot = sp.symbols("x x_dot")
+    >>> proof = sd.proofs.numeric_derivative("It is the rate of x^2.", x**2)
+    >>> proof.check(printed=x * x_dot, right=2 * x * x_dot, where={}).holds
+    True
     """
     if order not in (1, 2):
         raise CaseError([f"numeric differentiation of order {order} asked for; there are orders 1 and 2"])
@@ -289,6 +333,11 @@ def energy_balance(sentence: str, coordinates: Sequence[sp.Symbol], energy: Scal
     equations     makes, of the formula, residuals linear in the second derivatives, as many as coordinates; default: the formula
     power         of what is not in the energy, W
     Raises CaseError for an energy or power that is no expression.
+
+    >>> m, g, z, z_dot, z_ddot = sp.symbols("m g z z_dot z_ddot")
+    >>> proof = sd.proofs.energy_balance("A fall keeps its energy.", [z], m * z_dot**2 / 2 + m * g * z)
+    >>> proof.check(printed=m * z_ddot - m * g, right=m * z_ddot + m * g, where={}).holds
+    True
     """
     symbols = (coordinates,) if isinstance(coordinates, sp.Symbol) else tuple(coordinates)
     E, P = (taken(e, f"the {what} of the proof {sentence!r}").entries[0] for e, what in ((energy, "energy"), (power, "power")))

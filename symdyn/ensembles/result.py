@@ -74,23 +74,55 @@ class Ensemble:
 
     @property
     def samples(self) -> np.ndarray:
-        """What was sampled, (count, n_names)."""
+        """What was sampled, (count, n_names).
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+        >>> found.samples
+        array([[0.5],
+               [1. ]])
+        """
         with reading(self.file) as archive:
             return archive["samples"]  # type: ignore[no-any-return]
 
     @property
     def failed(self) -> np.ndarray:
-        """Which members failed, (count,) of bool."""
+        """Which members failed, (count,) of bool.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+        >>> found.failed
+        array([False, False])
+        """
         with reading(self.file) as archive:
             return archive["failed"]  # type: ignore[no-any-return]
 
     def failures(self, most: int | None = None) -> list[Failure]:
-        """Members that failed, each with index, values and message; the first few, or all."""
+        """Members that failed, each with index, values and message; the first few, or all.
+
+        >>> import tempfile, warnings
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> with warnings.catch_warnings():
+        ...     warnings.simplefilter("ignore")
+        ...     found = sd.ensemble(module, {"l": [0.0, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+        ...
+        >>> [(failure["index"], failure["values"]) for failure in found.failures()]
+        [(0, {'l': 0.0})]
+        """
         return read_failures(self.path, most)
 
     def plot(self, path: PathName | None = None, scatter: Sequence[tuple[str, str]] | None = None) -> Figure:
         """Quantiles of every trace over time, and pairs of (sampled, outcome) as points; returns the matplotlib figure, and saves
-        it if a path is given. Raises MissingExtra without matplotlib, ArgumentError for unknown names."""
+        it if a path is given. Raises MissingExtra without matplotlib, ArgumentError for unknown names.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["trace q1"], path=tempfile.mkdtemp())
+        >>> len(found.plot().axes)
+        1
+        """
         from symdyn.ensembles.picture import draw
 
         return draw(self, path, scatter)

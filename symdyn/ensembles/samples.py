@@ -104,7 +104,13 @@ class Samples:
         self._sequence: tuple[Any, int] | None = None
 
     def block(self, first: int, stop: int) -> np.ndarray:
-        """Samples first to stop - 1, (stop - first, n_names)."""
+        """Samples first to stop - 1, (stop - first, n_names).
+
+        >>> sd.Samples({"m": {"from": 1, "to": 2, "count": 3}, "l": [0.5, 1.0]}).block(0, 3)
+        array([[1. , 0.5],
+               [1. , 1. ],
+               [1.5, 0.5]])
+        """
         k = np.arange(first, stop)
         if self.sampling == "paired":
             columns = [_values(a)[k if a.varies else 0 * k] for a in self._axes]
@@ -127,7 +133,11 @@ class Samples:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Names of what is not the same in all samples."""
+        """Names of what is not the same in all samples.
+
+        >>> sd.Samples({"m": 1.0, "l": [0.5, 1.0]}).varied
+        ('l',)
+        """
         return tuple(n for n, a in zip(self.names, self._axes, strict=True) if a.varies)
 
     def _probabilities(self, k: np.ndarray) -> np.ndarray:

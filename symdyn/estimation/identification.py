@@ -61,6 +61,14 @@ class Identification(Estimate):
         """The ten inertial parameters of a body about its origin, in its axes: m, h_x ... h_z, I_xx ... I_zz.
 
         Raises ArgumentError for another name, and where base parameters were identified, which belong to no single body.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> q = np.linspace(0, 1, 20)[:, None]
+        >>> tau = module.evaluate("inverse_dynamics", 0.0, np.hstack([q, q]), {"m": 2.0}, ud=q)
+        >>> motion, nominal = sd.MeasuredMotion(q[:, 0], q, tau, u=q, ud=q), {"bob": [1, 0, -1, 0, 1.2, 0, 0, 0.2, 0, 1.2]}
+        >>> found = sd.identify(module, motion, noise=0.01, consistent=True, nominal=nominal)
+        >>> round(found.body("bob")["h_y"], 3), round(found.body("bob")["I_zz"], 3)
+        (-2.0, 2.0)
         """
         bodies = self.module.metadata.bodies
         if not self.consistent:
@@ -71,7 +79,16 @@ class Identification(Estimate):
         return {entry: self.values[f"{entry}_{name}"] for entry in PARAMETERS}
 
     def pseudo_inertia(self, name: str) -> np.ndarray:
-        """The pseudo-inertia of a body, (4, 4): [[S, h], [h^T, m]] S = tr(I)/2 1 - I, positive definite; errors as `body`."""
+        """The pseudo-inertia of a body, (4, 4): [[S, h], [h^T, m]] S = tr(I)/2 1 - I, positive definite; errors as `body`.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> q = np.linspace(0, 1, 20)[:, None]
+        >>> tau = module.evaluate("inverse_dynamics", 0.0, np.hstack([q, q]), {"m": 2.0}, ud=q)
+        >>> motion, nominal = sd.MeasuredMotion(q[:, 0], q, tau, u=q, ud=q), {"bob": [1, 0, -1, 0, 1.2, 0, 0, 0.2, 0, 1.2]}
+        >>> P = sd.identify(module, motion, noise=0.01, consistent=True, nominal=nominal).pseudo_inertia("bob")
+        >>> P.shape, bool(np.linalg.eigvalsh(P).min() > 0)
+        ((4, 4), True)
+        """
         return pseudo_inertia(np.array(list(self.body(name).values())))
 
     def __str__(self) -> str:

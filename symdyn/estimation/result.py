@@ -71,7 +71,14 @@ class Fit(Estimate):
                    found.success, found.message, problem.runs, found.degrees, problem.known)
 
     def plot(self, path: PathName | None = None) -> Figure:
-        """Measured values, motion, and residuals over time; written to a file if a path is given."""
+        """Measured values, motion, and residuals over time; written to a file if a path is given.
+
+        >>> module = sd.systems.pendulum().compile()
+        >>> truth = module.simulate(np.linspace(0, 2, 50), q=[0.5], params={"l": 1.3})
+        >>> found = sd.fit(module, sd.Experiment(truth.t, {"q1": truth.q[:, 0]}, q=[0.5]), ["l"])
+        >>> len(found.plot().axes)
+        2
+        """
         from symdyn.pictures.fits import plot
 
         return plot(self, path)

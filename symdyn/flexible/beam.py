@@ -91,6 +91,10 @@ class Beam:
 
         The tip body, the angular velocity of the root and gravity are as for `clamped`; gyroscopic terms are left out, so
         that the modes are real. At least 24 cubic elements, 4 for each mode, with nodes at all stations.
+
+        >>> beam = sd.Beam([0, 1], mass_per_length=2.0, stiffness=50.0, shapes=1, length=3.0)
+        >>> [shape.name for shape in beam.modes(4)]
+        ['mode 1', 'mode 2', 'mode 3', 'mode 4']
         """
         if not _whole(count, 1) or count > _MOST_MODES:
             raise ArgumentError(f"count is {shown(count)}; pass a whole number of modes from 1 to {_MOST_MODES}")

@@ -62,11 +62,20 @@ class Shape:
         return both
 
     def along(self, direction: str) -> bool:
-        """Whether it deflects in this direction alone."""
+        """Whether it deflects in this direction alone.
+
+        >>> bent = sd.Shape("x", [1.0]) + sd.Shape("y", [1.0])
+        >>> sd.Shape("x", [1.0]).along("x"), bent.along("x")
+        (True, False)
+        """
         return all(part == direction for part, _, _ in self.parts)
 
     def named(self, name: str) -> Shape:
-        """The same shape under another name."""
+        """The same shape under another name.
+
+        >>> sd.Shape("x", [1.0]).named("flap").name
+        'flap'
+        """
         same = Shape.__new__(Shape)
         same.name, same.faults, same.parts = str(name), [*self.faults], self.parts
         return same

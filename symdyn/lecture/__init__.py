@@ -23,5 +23,9 @@ def cases() -> tuple[Case, ...]:
 
 
 def names() -> list[str]:
-    """Names of all cases."""
+    """Names of all cases.
+
+    >>> "pendulum-embedding" in sd.lecture.names()
+    True
+    """
     return [case.name for case in cases()]

@@ -43,7 +43,14 @@ class Shape:
 @dataclass(frozen=True)
 class Box(Shape):
     """A box with edges along the body axes: size (3,) and centre (3,), m; hole: (2,) along x and y of an opening through its
-    middle along z, such as a moonpool."""
+    middle along z, such as a moonpool.
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Box([0.2, 0.2, 0.2], center=[0, -1, 0])
+    >>> system.draw("bob", shape, color="0.7")
+    >>> shape.size, len(system.shapes)
+    ([0.2, 0.2, 0.2], 1)
+    """
 
     size: Any
     center: Any = (0, 0, 0)
@@ -72,7 +79,14 @@ class Box(Shape):
 
 @dataclass(frozen=True)
 class Cylinder(Shape):
-    """A cylinder or cone from the centre of one end to that of the other, (3,) each, with the radii there, m."""
+    """A cylinder or cone from the centre of one end to that of the other, (3,) each, with the radii there, m.
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Cylinder([0, 0, 0], [0, -1, 0], radius_start=0.05, radius_end=0.02)
+    >>> system.draw("bob", shape, color="0.7")
+    >>> shape.radius_end, len(system.shapes)
+    (0.02, 1)
+    """
 
     start: Any
     end: Any
@@ -98,6 +112,12 @@ class Blade(Shape):
 
     chords      widths at two or more stations that share the length equally, m
     direction   (3,) of the chords; thickness: of a section, as a part of its chord
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Blade([0, 0, 0], [0, -1, 0], chords=[0.1, 0.2, 0.05], direction=[1, 0, 0])
+    >>> system.draw("bob", shape, color="0.7")
+    >>> shape.chords, len(system.shapes)
+    ([0.1, 0.2, 0.05], 1)
     """
 
     start: Any
@@ -133,6 +153,12 @@ class Line(Shape):
     """A line through points, (n, 3) each; width in points of print.
 
     to   a body (or its name) and a point on it, (3,), that the line goes on to: a rope between two bodies
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Line([[0, 0], [0, -1]], width=3)
+    >>> system.draw("bob", shape, color="0.7")
+    >>> shape.points, len(system.shapes)
+    ([[0, 0], [0, -1]], 1)
     """
 
     points: Sequence[Any]
@@ -165,6 +191,12 @@ class Mesh(Shape):
     """Triangles: vertices (n, 3) in m, numbers; faces (m, 3), indices of vertices, counter-clockwise from outside.
 
     It may have any form; pictures that are drawn without depth sort its triangles by their distance.
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> system.draw("bob", shape, color="0.7")
+    >>> len(shape.faces), len(system.shapes)
+    (4, 1)
     """
 
     vertices: Any
@@ -204,6 +236,12 @@ class Water(Shape):
             rad/s, m, rad, s: the surface is amplitude cos(frequency t - 2 pi s / length) above the level, s along the heading,
             which is an angle from x about z; within the time of the ramp it grows from nothing, by (1 - cos(pi t / ramp)) / 2;
             without a ramp, or with 0, it is there at once
+
+    >>> system = sd.systems.pendulum()
+    >>> shape = sd.shapes.Water(size=[4, 4], level=-2)
+    >>> system.draw(system.ground, shape, color="0.7")
+    >>> shape.level, len(system.shapes)
+    (-2, 1)
     """
 
     size: Any = None

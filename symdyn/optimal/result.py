@@ -110,17 +110,39 @@ class Optimum(OverTime):
 
     @property
     def cost_difference(self) -> float:
-        """By how much the cost integrated along the motion is above that of the quadrature of the mesh."""
+        """By how much the cost integrated along the motion is above that of the quadrature of the mesh.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> bool(abs(found.cost_difference) < 1e-3 * found.cost)
+        True
+        """
         return self.integrated_cost - self.cost
 
     @property
     def table(self) -> Piecewise:
-        """The inputs as `simulate` takes them, inputs=optimum.table: exactly these, steps end where intervals do."""
+        """The inputs as `simulate` takes them, inputs=optimum.table: exactly these, steps end where intervals do.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> motion = found.module.simulate(found.t, [0.0, 0.0], inputs=found.table)
+        >>> bool(np.allclose(motion.inputs[:, 0], found["F"], atol=1e-9))
+        True
+        """
         return as_table(self.inputs_over_time)
 
     def simulate(self, t: Row | None = None, rtol: float = 1e-9, method: str | None = None) -> Solution:
         """The motion from the same start with these inputs, integrated with error control, rtol being relative to the sizes of
-        states, too; t: output times, default: the nodes."""
+        states, too; t: output times, default: the nodes.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> round(float(found.simulate()["q1"][-1]), 4)
+        0.1
+        """
         sizes = self.module.metadata.sizes
         q, u, z = np.split(self.x[0], [sizes.q, sizes.q + sizes.u])
         atol = rtol * np.array(list(self.sizes.values()))
@@ -134,13 +156,26 @@ class Optimum(OverTime):
         Q, R, Qf   matrices, their diagonals, or weights by name or symbol: of the states (n_x,), of inputs, of the states at the
                    end (default: the numbers of Q)
         Returns a function of (t, x) for simulate(inputs=...). Raises ArgumentError for weights that do not fit.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> found.lqr(Q=[1, 1, 0, 0], R=[0.1])
+        <Tracking of cart_pole from 0 to 0.5 s by F>
         """
         from symdyn.optimal.tracking import tracking
 
         return tracking(self, Q, R, Qf)
 
     def plot(self, path: PathName | None = None) -> Figure:
-        """States, inputs and errors over time; written to a file if a path is given."""
+        """States, inputs and errors over time; written to a file if a path is given.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> len(found.plot().axes)
+        4
+        """
         from symdyn.pictures.optima import plot
 
         return plot(self, path)

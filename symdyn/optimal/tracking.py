@@ -89,14 +89,29 @@ class Tracking:
         return float(self.motion.t[-1])
 
     def S(self, t: float) -> np.ndarray:
-        """(n_x, n_x): what is left to pay for a deviation dx at a time is dx^T S dx."""
+        """(n_x, n_x): what is left to pay for a deviation dx at a time is dx^T S dx.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> tracking = found.lqr(Q=[1, 1, 0, 0], R=[0.1], Qf=[5, 6, 7, 8])
+        >>> np.round(tracking.S(found.duration).diagonal(), 6)
+        array([5., 6., 7., 8.])
+        """
         n = len(self.Q)
         found = np.asarray(self._S(float(self.motion.within(t)))).reshape(n, n)
         return np.asarray((found + found.T) / 2)
 
     def K(self, t: float) -> np.ndarray:
         """The gain at a time, (k, n_x), rows as driven, columns as the state; by polynomials through exact values. Raises
-        ArgumentError beyond the motion."""
+        ArgumentError beyond the motion.
+
+        >>> F = sd.inputs("F")
+        >>> found = sd.optimize(sd.systems.cart_pole().compile(), sd.Loss(integral=F**2), 0.5, start={"q2": 0.0}, end={"q1": 0.1},
+        ...                     intervals=4, tolerance=None, method="slsqp")
+        >>> found.lqr(Q=[1, 1, 0, 0], R=[0.1]).K(0.25).shape
+        (1, 4)
+        """
         return np.asarray(self._K(float(self.motion.within(t))))
 
     def __repr__(self) -> str:

@@ -1025,6 +1025,21 @@ class Module:
                    equations are constant in them
         Without blades a change of variables that makes the equations constant is looked for; where there is none (two blades, an
         anisotropic rotor on anisotropic bearings), Floquet theory gives the modes. Raises NoEquilibrium, ArgumentError.
+
+        >>> a, b, phi = sd.coordinates("a b phi")
+        >>> system = sd.System("disc")
+        >>> yoke, gimbal = system.add_body("yoke", mass=0), system.add_body("gimbal", mass=0)
+        >>> disc = system.add_body("disc", mass=1, inertia=[0.5, 0.5, 0.8])
+        >>> x = system.add_joint(sd.Revolute("x", system.ground, yoke, a, axis=[1, 0, 0]))
+        >>> y = system.add_joint(sd.Revolute("y", yoke, gimbal, b, axis=[0, 1, 0]))
+        >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
+        >>> system.add_joint_force(x, -50 * a)
+        >>> system.add_joint_force(y, -72 * b)
+        >>> system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+        disc: damped natural frequencies in the fixed frame, Hz, held: phi_dot
+         phi_dot [rad/s]  a backward  b forward
+                       0      1.5915     1.9099
+                       2      1.4688     2.0694
         """
         from symdyn.statics.campbell import campbell
 
@@ -1140,7 +1155,14 @@ class Module:
         return write_modelica(self, folder, q=q, u=u, z=z, params=params, inputs=inputs)
 
     def split_outputs(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """The user's outputs by name from the rows of the function `outputs`."""
+        """The user's outputs by name from the rows of the function `outputs`.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_output("tip", sd.position("bob"))
+        >>> module = system.compile(backend="numpy")
+        >>> module.split_outputs(module.evaluate("outputs", 0.0, [0.0, 0.0]))["tip"]
+        array([0., 0.])
+        """
         result, start = {}, 0
         for name, shape in self.metadata.outputs:
             size = int(np.prod(shape))
@@ -1205,7 +1227,15 @@ class Module:
     @contextlib.contextmanager
     def noting(self, note: Callable[[str], None]) -> Iterator[None]:
         """Have a function called whenever this thread makes a function of the module, which may take long: with a label at the
-        beginning, and with "" at the end."""
+        beginning, and with "" at the end.
+
+        >>> module, made = sd.systems.pendulum().compile(backend="numpy"), []
+        >>> with module.noting(made.append):
+        ...     rate = module.rhs(0.0, [0.0, 1.0])
+        ...
+        >>> made
+        ['rhs', '']
+        """
         self._notes.take = note
         try:
             yield

@@ -56,6 +56,19 @@ class Campbell:
                   Stability of a periodic motion)
     frame         "fixed" or "rotating": who sees these frequencies; held: names of what is held
     varies        of averaged equations, by what part of their largest entry they differ over a turn
+
+    >>> a, b, phi = sd.coordinates("a b phi")
+    >>> system = sd.System("disc")
+    >>> yoke, gimbal = system.add_body("yoke", mass=0), system.add_body("gimbal", mass=0)
+    >>> disc = system.add_body("disc", mass=1, inertia=[0.5, 0.5, 0.8])
+    >>> x = system.add_joint(sd.Revolute("x", system.ground, yoke, a, axis=[1, 0, 0]))
+    >>> y = system.add_joint(sd.Revolute("y", yoke, gimbal, b, axis=[0, 1, 0]))
+    >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
+    >>> system.add_joint_force(x, -50 * a)
+    >>> system.add_joint_force(y, -72 * b)
+    >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+    >>> diagram.speed, diagram.names
+    ('phi_dot', ('a backward', 'b forward'))
     """
 
     title: str
@@ -71,12 +84,42 @@ class Campbell:
 
     @property
     def frequencies(self) -> np.ndarray:
-        """|Im eigenvalue| / 2 pi, Hz, (n, n_modes)."""
+        """|Im eigenvalue| / 2 pi, Hz, (n, n_modes).
+
+        >>> a, b, phi = sd.coordinates("a b phi")
+        >>> system = sd.System("disc")
+        >>> yoke, gimbal = system.add_body("yoke", mass=0), system.add_body("gimbal", mass=0)
+        >>> disc = system.add_body("disc", mass=1, inertia=[0.5, 0.5, 0.8])
+        >>> x = system.add_joint(sd.Revolute("x", system.ground, yoke, a, axis=[1, 0, 0]))
+        >>> y = system.add_joint(sd.Revolute("y", yoke, gimbal, b, axis=[0, 1, 0]))
+        >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
+        >>> system.add_joint_force(x, -50 * a)
+        >>> system.add_joint_force(y, -72 * b)
+        >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+        >>> np.round(diagram.frequencies * 2 * np.pi, 6)
+        array([[10.      , 12.      ],
+               [ 9.228958, 13.002551]])
+        """
         return np.asarray(np.abs(self.eigenvalues.imag) / (2 * np.pi))
 
     @property
     def damping(self) -> np.ndarray:
-        """Damping ratios, (n, n_modes); negative where a mode grows."""
+        """Damping ratios, (n, n_modes); negative where a mode grows.
+
+        >>> a, b, phi = sd.coordinates("a b phi")
+        >>> system = sd.System("disc")
+        >>> yoke, gimbal = system.add_body("yoke", mass=0), system.add_body("gimbal", mass=0)
+        >>> disc = system.add_body("disc", mass=1, inertia=[0.5, 0.5, 0.8])
+        >>> x = system.add_joint(sd.Revolute("x", system.ground, yoke, a, axis=[1, 0, 0]))
+        >>> y = system.add_joint(sd.Revolute("y", yoke, gimbal, b, axis=[0, 1, 0]))
+        >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
+        >>> system.add_joint_force(x, -50 * a)
+        >>> system.add_joint_force(y, -72 * b)
+        >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+        >>> np.round(diagram.damping, 9) + 0.0
+        array([[0., 0.],
+               [0., 0.]])
+        """
         size = np.abs(self.eigenvalues)
         return np.asarray(np.where(size > 0, -self.eigenvalues.real / np.where(size > 0, size, 1.0), 0.0))
 
@@ -90,6 +133,20 @@ class Campbell:
         """The diagram up to a frequency (Hz), with lines of multiples of the rotor's speed, as a figure; saved to a path.
 
         By default modes that are far above the others and the lines are left out, which the legend reports. Needs matplotlib.
+
+        >>> a, b, phi = sd.coordinates("a b phi")
+        >>> system = sd.System("disc")
+        >>> yoke, gimbal = system.add_body("yoke", mass=0), system.add_body("gimbal", mass=0)
+        >>> disc = system.add_body("disc", mass=1, inertia=[0.5, 0.5, 0.8])
+        >>> x = system.add_joint(sd.Revolute("x", system.ground, yoke, a, axis=[1, 0, 0]))
+        >>> y = system.add_joint(sd.Revolute("y", yoke, gimbal, b, axis=[0, 1, 0]))
+        >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
+        >>> system.add_joint_force(x, -50 * a)
+        >>> system.add_joint_force(y, -72 * b)
+        >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+        >>> figure = diagram.plot()
+        >>> figure.axes[0].get_ylabel()
+        'damped frequency, fixed frame [Hz]'
         """
         from symdyn.pictures.campbell import plot
 

@@ -57,6 +57,15 @@ class Carried(NamedTuple):
     force    along its normal and tangents, N, (1 + n_tangents,): where forces are not unique those of least norm that are
              within the cones
     least, most   of the normal force, N, over all forces that keep the state
+
+    >>> y = sd.coordinates("y")
+    >>> system = sd.System("ball", gravity=[0, -9.81])
+    >>> ball = system.add_body("ball", mass=1.0)
+    >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, y, axis=[0, 1]))
+    >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground, friction=0.5))
+    >>> carried = system.compile(backend="numpy").rest().contacts["floor"]
+    >>> carried.mode, carried.force
+    ('sticking', array([9.81, 0.  ]))
     """
 
     mode: str
@@ -72,6 +81,15 @@ class Rest:
     t, x, params, inputs   params with the modes of the contacts
     contacts    what each carries, by name; unique: whether the forces are
     slack       how far the forces are within the cones, by the largest force: 0 at the edge
+
+    >>> y = sd.coordinates("y")
+    >>> system = sd.System("ball", gravity=[0, -9.81])
+    >>> ball = system.add_body("ball", mass=1.0)
+    >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, y, axis=[0, 1]))
+    >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
+    >>> rest = system.compile(backend="numpy").rest()
+    >>> rest.carrying, rest.verdict, rest["y"]
+    (('floor',), '', 0.0)
     """
 
     module: Module
@@ -94,25 +112,68 @@ class Rest:
 
     @property
     def carrying(self) -> tuple[str, ...]:
-        """Contacts that carry something, whichever the forces are."""
+        """Contacts that carry something, whichever the forces are.
+
+        >>> y = sd.coordinates("y")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> ball = system.add_body("ball", mass=1.0)
+        >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, y, axis=[0, 1]))
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> system.compile(backend="numpy").rest().carrying
+        ('floor',)
+        """
         largest = max((one.most for one in self.contacts.values()), default=0.0)
         return tuple(name for name, one in self.contacts.items() if one.least > WITHIN * largest)
 
     @cached_property
     def linear(self) -> Linearization:
-        """The linear equations about it with the contacts in their modes."""
+        """The linear equations about it with the contacts in their modes.
+
+        >>> x, y = sd.coordinates("x y")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> cart, ball = system.add_body("cart", mass=0), system.add_body("ball", mass=1.0)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, cart, x, axis=[1, 0]))
+        >>> joint = system.add_joint(sd.Prismatic("height", cart, ball, y, axis=[0, 1]))
+        >>> system.add_joint_force(slide, -4 * x)
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> linear = system.compile(backend="numpy").rest().linear
+        >>> linear.coordinates, np.round(linear.K, 9)
+        (('x',), array([[4.]]))
+        """
         return self.module.linearize(self)
 
     @property
     def verdict(self) -> str:
         """That of the linear equations: "stable", "neutral", "drifts", "unstable" or "not decided", "" where nothing is free to
         move; "not decided" as well where contacts that touch carry nothing or are at the edge of their cones, since small
-        disturbances change their modes."""
+        disturbances change their modes.
+
+        >>> x, y = sd.coordinates("x y")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> cart, ball = system.add_body("cart", mass=0), system.add_body("ball", mass=1.0)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, cart, x, axis=[1, 0]))
+        >>> joint = system.add_joint(sd.Prismatic("height", cart, ball, y, axis=[0, 1]))
+        >>> system.add_joint_force(slide, -4 * x - x.dot)
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> system.compile(backend="numpy").rest().verdict
+        'stable'
+        """
         return "not decided" if self.slack <= WITHIN else self.linear.verdict
 
     def range(self, by: Any) -> tuple[float, float]:
         """Least and most value of a parameter or an input, by name or symbol, with which this position stays at rest; -inf and
-        inf where nothing bounds it. Raises ArgumentError for another name."""
+        inf where nothing bounds it. Raises ArgumentError for another name.
+
+        >>> y, F = sd.coordinates("y"), sd.inputs("F")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> ball = system.add_body("ball", mass=1.0)
+        >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, y, axis=[0, 1]))
+        >>> system.add_force(ball, [0, F])
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> least, most = system.compile(backend="numpy").rest().range(F)
+        >>> least, round(most, 6)
+        (-inf, 9.81)
+        """
         metadata, name = self.module.metadata, name_of(by)
         own = [n for record in metadata.contacts for n in record.parameters]
         if name not in (*metadata.parameters, *metadata.inputs) or name in own:
@@ -155,7 +216,18 @@ class Rest:
         return good
 
     def describe(self) -> str:
-        """The state and its contacts as a table."""
+        """The state and its contacts as a table.
+
+        >>> y = sd.coordinates("y")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> ball = system.add_body("ball", mass=1.0)
+        >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, y, axis=[0, 1]))
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground, friction=0.5))
+        >>> print(system.compile(backend="numpy").rest().describe())
+        ball: at rest on floor, forces not unique
+          y = 0 m
+          floor: sticking, 9.81, 0 N
+        """
         metadata = self.module.metadata
         kind = "forces unique" if self.unique else "forces not unique"
         lines = [f"{self.module.name}: at rest on {', '.join(self.carrying) or 'no contact'}, {kind}"]

@@ -83,6 +83,12 @@ class Equilibrium:
     residual           of forces that are left, by the speed they work along, N or N m
     iterations         steps tried
     name               distinguishes it from others (see Module.equilibria)
+
+    >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 0.1})
+    >>> np.round(rest.x, 9) + 0.0, rest.residual_norm < 1e-9
+    (array([0., 0.]), True)
+    >>> rest.verdict, rest.stable
+    ('neutral', True)
     """
 
     point: OperatingPoint
@@ -101,7 +107,12 @@ class Equilibrium:
 
     @property
     def x(self) -> np.ndarray:
-        """[q; u; z], (n_x,)."""
+        """[q; u; z], (n_x,).
+
+        >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0})
+        >>> np.round(rest.x, 6) + 0.0
+        array([3.141593, 0.      ])
+        """
         return self.point.x
 
     @property
@@ -118,12 +129,24 @@ class Equilibrium:
 
     @property
     def lam(self) -> np.ndarray:
-        """Multipliers, (n_c,); where constraints depend on each other those of least norm after scaling."""
+        """Multipliers, (n_c,); where constraints depend on each other those of least norm after scaling.
+
+        >>> module = sd.systems.pendulum_absolute().compile(backend="numpy")
+        >>> rest = module.equilibrium()
+        >>> np.round(rest.lam, 6)
+        array([-4.905])
+        """
         return self.point.lam
 
     @property
     def params(self) -> np.ndarray:
-        """Parameters in order, with those that were solved for, (n_p,)."""
+        """Parameters in order, with those that were solved for, (n_p,).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> rest = module.equilibrium(start={"q1": 0.1}, params={"m": 1.0, "l": 2.0})
+        >>> dict(zip(rest.module.metadata.parameters, rest.params.tolist()))
+        {'g': 9.81, 'm': 1.0, 'l': 2.0}
+        """
         return self.point.p
 
     @property
@@ -132,17 +155,33 @@ class Equilibrium:
 
     @property
     def residual_norm(self) -> float:
-        """Largest force or moment that is left, N or N m."""
+        """Largest force or moment that is left, N or N m.
+
+        >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 0.1})
+        >>> rest.residual_norm < 1e-9
+        True
+        """
         return max(map(abs, self.residual.values()), default=0.0)
 
     @property
     def solved(self) -> dict[str, float]:
-        """Parameters and inputs that were solved for, by name."""
+        """Parameters and inputs that were solved for, by name.
+
+        >>> module = sd.systems.cart_pole().compile(backend="numpy")
+        >>> rest = module.equilibrium(free=["q1", "F"], fixed={"q1": 0.0}, start={"q2": 0.0}, inputs={"F": 1.0})
+        >>> {name: round(value, 9) + 0.0 for name, value in rest.solved.items()}
+        {'F': 0.0}
+        """
         return {name: self[name] for name in self.selection.unknown}
 
     @property
     def held(self) -> tuple[str, ...]:
-        """Names of what is held when the state is disturbed: what was kept, but for conditions of what was solved for."""
+        """Names of what is held when the state is disturbed: what was kept, but for conditions of what was solved for.
+
+        >>> module = sd.systems.double_pendulum().compile(backend="numpy")
+        >>> module.equilibrium(start={"q2": 0.1}, fixed={"q1": 0.0}).held
+        ('q1',)
+        """
         return self.selection.held
 
     @cached_property
@@ -158,6 +197,10 @@ class Equilibrium:
         """Of the linearization, what is held left out, by size, (m,) complex, 1/s; of a periodic motion its exponents.
 
         Raises ArgumentError with the reason where there are none (a singular configuration).
+
+        >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 0.1}, params={"l": 9.81})
+        >>> sorted(np.round(rest.eigenvalues.imag, 6).tolist())
+        [-1.0, 1.0]
         """
         if self._judged.eigenvalues is None:
             raise ArgumentError(f"{self.module.name}: there are no eigenvalues here: {self._judged.reason}")
@@ -167,19 +210,33 @@ class Equilibrium:
     def verdict(self) -> str:
         """"stable" (all exponents proved negative), "neutral" (none positive, those that are zero without Jordan blocks),
         "drifts"
-        (with a Jordan block), "unstable" (one proved positive), "not decided"; "" if nothing is free to move."""
+        (with a Jordan block), "unstable" (one proved positive), "not decided"; "" if nothing is free to move.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.equilibrium(start={"q1": 0.1}).verdict, module.equilibrium(start={"q1": 3.0}).verdict
+        ('neutral', 'unstable')
+        """
         return self._judged.verdict
 
     @property
     def reason(self) -> str:
-        """What the verdict rests on, in a sentence with numbers."""
+        """What the verdict rests on, in a sentence with numbers.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}, params={"l": 9.81}).reason
+        'an exponent is proved positive: 1 1/s'
+        """
         return self._judged.reason
 
     @cached_property
     def stable(self) -> bool | None:
         """Whether small disturbances stay small: True where the verdict is "stable", and at a neutral state of rest at a strict
         minimum of the energy (Lagrange and Dirichlet), where undamped oscillations stay small; False where it is "unstable" or
-        "drifts"; else None."""
+        "drifts"; else None.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.equilibrium(start={"q1": 3.0}).stable
+        False
+        """
         if self.verdict in ("unstable", "drifts"):
             return False
         if self.verdict == "stable":
@@ -203,7 +260,11 @@ class Equilibrium:
 
     @property
     def message(self) -> str:
-        """What was found, in a sentence."""
+        """What was found, in a sentence.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}).message.partition(" after")[0]
+        'unstable equilibrium'
+        """
         kind = f"{self.verdict} equilibrium" if self.verdict else "equilibrium, nothing free to move,"
         if self.verdict == "not decided":
             kind = "equilibrium whose stability is not decided"
@@ -221,7 +282,13 @@ class Equilibrium:
                             "and inputs")
 
     def describe(self) -> str:
-        """The state as a table, with what was solved for, and whether it is stable."""
+        """The state as a table, with what was solved for, and whether it is stable.
+
+        >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0})
+        >>> print("\n".join(rest.describe().splitlines()[1:]))
+          q1   =      3.1415927 rad
+          an exponent is proved positive: 3.13209 1/s
+        """
         metadata = self.module.metadata
         shown = [*metadata.q, *[u for u in metadata.u if self[u]], *metadata.z, *self.selection.unknown]
         width = max([4, *map(len, shown)])

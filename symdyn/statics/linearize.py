@@ -66,6 +66,15 @@ class Linearization:
     coordinates   names of eta: of coordinates, of speeds that are no rates (turning about that axis)
     states        names of x', each once: a displacement along a speed that is no rate is along_ and the speed's name;
                   outputs: names of y', entries of vectors by number; held: names of what is held
+
+    >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+    >>> linear.states, linear.verdict
+    (('q1', 'q1_dot'), 'neutral')
+    >>> np.round(linear.A, 6) + 0.0
+    array([[ 0.  ,  1.  ],
+           [-9.81,  0.  ]])
+    >>> np.round(linear.M, 6), np.round(linear.K, 6)
+    (array([[1.]]), array([[9.81]]))
     """
 
     def __init__(self, manifold: Manifold, equilibrium: Equilibrium | None) -> None:
@@ -89,6 +98,11 @@ class Linearization:
         """(A, B, C, D); C and D have no rows without outputs.
 
         Raises ArgumentError where the constraints do not let the mechanism follow changes of a motion (sd.motions).
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": 0.0})
+        >>> A, B, C, D = linear.state_space
+        >>> A.shape, B.shape, C.shape, D.shape
+        ((4, 4), (4, 1), (0, 4), (0, 1))
         """
         self._manifold.demand_followed()
         return StateSpace(*self._manifold.matrices, *self._manifold.output_matrices())
@@ -99,7 +113,13 @@ class Linearization:
         return titled(self, table(("A", *self.states), rows))
 
     def tangent(self) -> np.ndarray:
-        """x' of the whole state = T [eta; zeta; z'], (n_x, m), with the inputs as they are."""
+        """x' of the whole state = T [eta; zeta; z'], (n_x, m), with the inputs as they are.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> linear.tangent()
+        array([[1., 0.],
+               [0., 1.]])
+        """
         return self._manifold.tangent()
 
     @property
@@ -120,7 +140,13 @@ class Linearization:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the rows of C_out and D."""
+        """Names of the rows of C_out and D.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_output("tip", sd.position("bob"))
+        >>> system.compile(backend="numpy").linearize({"q1": 0.0}).outputs
+        ('tip[0]', 'tip[1]')
+        """
         names: list[str] = []
         for name, shape in self.module.metadata.outputs:
             names += [name + (f"[{', '.join(map(str, index))}]" if index else "") for index in np.ndindex(*shape)]
@@ -128,7 +154,12 @@ class Linearization:
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second."""
+        """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": 0.0})
+        >>> dict(linear.units)
+        {'q1_dot': 'm/s', 'q2_dot': 'rad/s', 'F': 'N', 'q1': 'm', 'q2': 'rad'}
+        """
         known = self.module.metadata.units
         displaced = {name: known.get(name, known.get(self.module.metadata.u[k], "").removesuffix("/s") or "")
                      for name, k in zip(self.states, self._manifold.displacements, strict=False)}
@@ -138,7 +169,12 @@ class Linearization:
 
     @cached_property
     def steadiness(self) -> Steadiness:
-        """Whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason."""
+        """Whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.linearize({"q1": 0.0}).steadiness.kind, module.linearize({"q1": 0.5}).steadiness.kind
+        ('rest', '')
+        """
         return steadiness(self._manifold)
 
     def _demand_steady(self, what: str) -> None:
@@ -154,7 +190,12 @@ class Linearization:
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
-        """Of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion."""
+        """Of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> sorted(np.round(linear.eigenvalues.imag, 6).tolist())
+        [-3.132092, 3.132092]
+        """
         self._demand_steady("eigenvalues were")
         return self._analysis.eigenvalues
 
@@ -168,25 +209,43 @@ class Linearization:
         """"stable", "neutral", "drifts", "unstable" or "not decided", by the eigenvalues; "" if nothing is free to move.
 
         Raises ArgumentError where A is not constant along the motion.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.linearize({"q1": 0.0}).verdict, module.linearize({"q1": np.pi}).verdict
+        ('neutral', 'unstable')
         """
         self._demand_steady("a verdict was")
         return self._analysis.verdict
 
     def stability(self) -> Stability:
-        """The verdict with its evidence, also where A is not constant along the motion; see Module.stability."""
+        """The verdict with its evidence, also where A is not constant along the motion; see Module.stability.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": np.pi})
+        >>> linear.stability().verdict
+        'unstable'
+        """
         from symdyn.statics.stability import of_manifold
 
         return of_manifold(self._manifold)
 
     @property
     def inertia(self) -> np.ndarray:
-        """The mass matrix that compares shapes of modes, (n_u, n_u)."""
+        """The mass matrix that compares shapes of modes, (n_u, n_u).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.linearize({"q1": 0.0}, params={"m": 2.0, "l": 3.0}).inertia
+        array([[18.]])
+        """
         return self._manifold.inertia
 
     def modes(self) -> Modes:
         """Natural frequencies, damping ratios, periods, shapes; prints as a table. See symdyn.statics.modes.
 
         Raises ArgumentError where A is not constant along the motion.
+
+        >>> modes = sd.systems.double_pendulum().compile(backend="numpy").linearize({"q1": -np.pi / 2, "q2": 0.0}).modes()
+        >>> np.round(modes.frequencies, 6)
+        array([0.426553, 1.144113])
         """
         return self._modes
 
@@ -243,6 +302,11 @@ class Linearization:
         Raises ArgumentError for weights that are not definite, with the direction; where the equations are not stabilizable, with
         the mode that no input reaches; where Q gives no weight to a mode that neither decays nor grows; and where A is not
         constant along the motion. See symdyn.statics.regulator.Regulator, also for the source.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+        >>> regulator = linear.lqr(Q={"q1": 1.0, "q2": 10.0}, R={"F": 0.1})
+        >>> np.round(regulator.K, 4)
+        array([[ 3.1623, -7.7996,  3.462 , -1.3718]])
         """
         from symdyn.statics.regulator import lqr
 
@@ -255,6 +319,10 @@ class Linearization:
 
         At rest the motion is the state itself; along steady motion coordinates go on at constant rates. Raises ArgumentError
         where they do not (a wheel that rolls in a circle).
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> linear.deviation(0.0, {"q1": 0.1, "q1_dot": -0.2})
+        array([ 0.1, -0.2])
         """
         point, manifold = self._manifold.point, self._manifold
         metadata = self.module.metadata
@@ -273,14 +341,24 @@ class Linearization:
         return np.concatenate([v[manifold.displacements], off[n_q:n_q + n_u][manifold.speeds], off[n_q + n_u:][manifold.states]])
 
     def to_scipy(self) -> ScipyStateSpace:
-        """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs."""
+        """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": 0.0})
+        >>> linear.to_scipy().A.shape
+        (4, 4)
+        """
         from scipy.signal import StateSpace
 
         return StateSpace(self.A, self.B, *self.observed()[:2])
 
     def to_control(self) -> ControlStateSpace:
         """The equations as a control.StateSpace of python-control, with names of states, inputs and outputs; with the states as
-        its outputs where the system has no outputs. Raises MissingExtra where python-control is not installed."""
+        its outputs where the system has no outputs. Raises MissingExtra where python-control is not installed.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": 0.0})
+        >>> linear.to_control().state_labels
+        ['q1', 'q2', 'q1_dot', 'q2_dot']
+        """
         try:
             import control
         except ImportError:
@@ -290,7 +368,14 @@ class Linearization:
                           outputs=list(outputs), name=self.module.name)
 
     def observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-        """C, D and names of the outputs, or of the states without outputs."""
+        """C, D and names of the outputs, or of the states without outputs.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> C, D, names = linear.observed()
+        >>> C, names
+        (array([[1., 0.],
+               [0., 1.]]), ('y_q1', 'y_q1_dot'))
+        """
         if self.outputs:
             return self.C_out, self.D, self.outputs
         return np.eye(len(self.states)), np.zeros(self.B.shape), tuple(f"y_{n}" for n in self.states)
@@ -302,6 +387,11 @@ class Linearization:
         About an Equilibrium its shift with the parameter counts, and that of what was solved for; at another state the state
         stays. Raises ArgumentError for double eigenvalues, and where what this needs is not constant: turning Euler parameters,
         motion under constraints, part of an orientation that is kept.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 1.0})
+        >>> by_length = linear.derivative(0, "l")
+        >>> round(float(by_length.frequency), 6), round(float(-np.sqrt(9.81) / (4 * np.pi)), 6)
+        (-0.249244, -0.249244)
         """
         manifold = self._manifold
         point, selection = manifold.point, manifold.selection
@@ -344,7 +434,14 @@ class Linearization:
             return f"no verdict: {str(error).removeprefix(f'{self.module.name}: ')}"
 
     def describe(self) -> str:
-        """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
+        """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> print("\n".join(linear.describe().splitlines()[1:4]))
+        A                  q1 [rad]  q1_dot [rad/s]
+        q1 [rad]                  0               1
+        q1_dot [rad/s]        -9.81               0
+        """
         inputs = tuple(self.module.metadata.inputs)
         lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
                  "has the unit of its row by that of its column and s, of C_out and D by that of its column"]

@@ -32,6 +32,16 @@ class RootLocus:
                   of eigenvalues has become real, or two real ones a pair
     names         of the modes, by the coordinates with most kinetic energy over all values
     linear        the linear equations at every value
+
+    >>> module = sd.systems.pendulum().compile(backend="numpy")
+    >>> locus = module.root_locus("l", [1.0, 4.0], at={"q1": 0.0})
+    >>> locus.parameter, locus.values
+    ('l', array([1., 4.]))
+    >>> locus
+    pendulum: eigenvalues over l, 1/s
+               l [m]                      q1
+                   1           0 +- 3.13209i
+                   4           0 +- 1.56605i
     """
 
     title: str
@@ -50,13 +60,23 @@ class RootLocus:
 
     @property
     def growth(self) -> np.ndarray:
-        """The largest real part at every value, (n,), 1/s: positive where a disturbance grows."""
+        """The largest real part at every value, (n,), 1/s: positive where a disturbance grows.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> np.round(module.root_locus("l", [1.0, 4.0], at={"q1": np.pi}).growth, 6)
+        array([3.132092, 1.566046])
+        """
         return np.array([np.nanmax(row.real, initial=-np.inf) for row in self.eigenvalues])
 
     def plot(self, path: PathName | None = None, damping: bool = True) -> Figure:
         """The eigenvalues in the complex plane, coloured by the parameter, as a figure; saved to a path.
 
         damping   with rays of equal damping ratio. Needs matplotlib.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> figure = module.root_locus("l", [1.0, 4.0], at={"q1": 0.0}).plot()
+        >>> len(figure.axes)
+        2
         """
         from symdyn.pictures.locus import plot
 

@@ -123,7 +123,19 @@ class Mode:
 
 
 class Modes:
-    """Modes in the order of their natural frequencies; prints as a table. An index is a number, a name, or its first part."""
+    """Modes in the order of their natural frequencies; prints as a table. An index is a number, a name, or its first part.
+
+    >>> modes = sd.systems.double_pendulum().compile(backend="numpy").linearize({"q1": -np.pi / 2, "q2": 0.0}).modes()
+    >>> len(modes), round(float(modes[0].period), 6)
+    (2, 2.344372)
+    >>> modes
+    double_pendulum: modes
+         mode       f [Hz]  omega [rad/s]  damped period [s]    damping  time constant [s]  kind
+      0  q1       0.426553        2.68011            2.34437          0                     oscillation
+      1  q2        1.14411        7.18867            0.87404          0                     oscillation
+    shapes: q1, q2 in rad
+    neutral: no exponent is positive, and those that are zero have as many eigenvectors (2 undamped oscillations)
+    """
 
     def __init__(self, title: str, modes: Iterable[Mode], notes: Sequence[str] = ()) -> None:
         self.title = title
@@ -151,12 +163,22 @@ class Modes:
 
     @property
     def frequencies(self) -> np.ndarray:
-        """Natural frequencies, Hz, (n_modes,)."""
+        """Natural frequencies, Hz, (n_modes,).
+
+        >>> modes = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81}).modes()
+        >>> np.round(2 * np.pi * modes.frequencies, 6)
+        array([1.])
+        """
         return np.array([m.frequency for m in self.modes])
 
     @property
     def eigenvalues(self) -> np.ndarray:
-        """(n_modes,) complex."""
+        """(n_modes,) complex.
+
+        >>> modes = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81}).modes()
+        >>> np.round(modes.eigenvalues.imag, 6)
+        array([1.])
+        """
         return np.array([m.eigenvalue for m in self.modes], dtype=complex)
 
     def __repr__(self) -> str:

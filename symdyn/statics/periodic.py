@@ -63,6 +63,11 @@ class PeriodicMotion:
     multipliers  of Floquet, complex, the largest first: factors of small disturbances over a period, along the constraints; where
                  the period is free one of them, that of a shift along the motion, is 1
     residual     what is left after a period, the largest entry; iterations: of Newton's method
+
+    >>> module = sd.systems.pendulum().compile()
+    >>> motion = module.periodic(2.0, [0.5], [0.0])
+    >>> round(motion.period, 6), motion.x.tolist()
+    (2.037868, [0.5, 0.0])
     """
 
     module: Module
@@ -81,6 +86,14 @@ class PeriodicMotion:
 
         Multipliers that fall together with that of the shift, as where motions of all amplitudes are periodic, are known to the
         square root of the error only; their product is known as well as a single one.
+
+        >>> q = sd.coordinates("q")
+        >>> system = sd.System("van_der_pol")
+        >>> body = system.add_body("body", mass=1)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+        >>> system.add_joint_force(slide, (1 - q**2) * q.dot - q)
+        >>> system.embedding().compile().periodic(6.0, [2.0], [0.0]).stable
+        True
         """
         sizes, error = np.abs(self.multipliers), CLOSED * self._problem.rtol
         if self.free_period:
@@ -92,7 +105,12 @@ class PeriodicMotion:
         return bool((sizes < 1 - error).all())
 
     def simulate(self, n: int = 201) -> Solution:
-        """The motion over a period, at n times. Raises ArgumentError for another number than a whole one from 2 on."""
+        """The motion over a period, at n times. Raises ArgumentError for another number than a whole one from 2 on.
+
+        >>> motion = sd.systems.pendulum().compile().periodic(2.0, [0.5], [0.0]).simulate(5)
+        >>> np.round(motion["q1"], 6) + 0.0
+        array([ 0.5,  0. , -0.5,  0. ,  0.5])
+        """
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 2:
             raise ArgumentError(f"{self.module.name}: a period was asked for at {shown(n)} times; pass a whole number from 2 on")
         return self._problem.solution(self.x, self.period, n)
@@ -103,6 +121,15 @@ class PeriodicMotion:
 
         Raises ArgumentError for an unknown parameter, NoEquilibrium where the way ends, with the value; the motions until then
         are its `found`.
+
+        >>> q, c = sd.coordinates("q"), sd.parameters("c")
+        >>> system = sd.System("van_der_pol")
+        >>> body = system.add_body("body", mass=1)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, body, q, axis=[1, 0]))
+        >>> system.add_joint_force(slide, c * (1 - q**2) * q.dot - q)
+        >>> motion = system.compile().periodic(6.0, [2.0], [0.0], params={c: 1.0})
+        >>> [round(found.period, 4) for found in motion.follow(c, [0.5, 0.1])]
+        [6.3807, 6.2871]
         """
         parameters = list(self.module.metadata.parameters)
         asked = name_of(name)
@@ -134,6 +161,16 @@ class PeriodicMotion:
                       where the branch is bent; negative: it begins with smaller values of the parameter
         n             motions at most
         Raises ArgumentError for what does not fit, NoEquilibrium where the branch is lost, with the value.
+
+        >>> q, c = sd.coordinates("q"), sd.parameters("c")
+        >>> system = sd.System("van_der_pol")
+        >>> body = system.add_body("body", mass=1)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, body, q, axis=[1, 0]))
+        >>> system.add_joint_force(slide, c * (1 - q**2) * q.dot - q)
+        >>> motion = system.compile().periodic(6.0, [2.0], [0.0], params={c: 1.0})
+        >>> found = motion.branch(c, 0.5, 5.0, n=3)
+        >>> [bool(a.period < b.period) for a, b in zip(found, found[1:])]
+        [True, True]
         """
         from symdyn.statics.branches import branch
 

@@ -52,6 +52,13 @@ class Regulator:
     as they are there. Pass it to `simulate` as inputs=regulator, or inputs=sd.Sampled(regulator, period=0.01). `regulator[F]` is
     the function of (t, x) of one input, `regulator[F, M]` that of several, to be passed with what others have:
     inputs={F: regulator[F], road: table}, or inputs={(F, M): sd.Sampled(regulator[F, M], period=0.01), road: table}.
+
+    >>> module = sd.systems.cart_pole().compile(backend="numpy")
+    >>> regulator = module.linearize({"q2": np.pi}).lqr(Q=[1, 1, 0, 0], R=[0.1])
+    >>> regulator.K.shape, bool(regulator.eigenvalues.real.max() < 0)
+    ((1, 4), True)
+    >>> np.round(regulator(0.0, {"q1": 0.0, "q2": np.pi}), 9) + 0.0
+    array([0.])
     """
 
     linear: Linearization
@@ -81,7 +88,15 @@ class Regulator:
         return lambda t, x: self(t, x)[index]
 
     def describe(self) -> str:
-        """The gain with names and units, and the eigenvalues of the closed loop."""
+        """The gain with names and units, and the eigenvalues of the closed loop.
+
+        >>> regulator = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi}).lqr(Q=[1, 1, 0, 0], R=[0.1])
+        >>> print(regulator.describe())
+        cart_pole: linear-quadratic regulator, in' = -K x'; K in the unit of the input by that of the state
+                    q1 [m]     q2 [rad]  q1_dot [m/s]  q2_dot [rad/s]
+        F [N]       3.1623      -2.0012        2.8718        -0.45531
+        closed loop: -1.1621 - 1.1925i, -1.1621 + 1.1925i, -0.57196 - 4.0059i, -0.57196 + 4.0059i 1/s
+        """
         values = ", ".join(f"{v.real:.5g}" + (f" {'+' if v.imag > 0 else '-'} {abs(v.imag):.5g}i" if v.imag else "")
                            for v in self.eigenvalues)
         return (f"{self.linear.module.name}: linear-quadratic regulator, in' = -K x'; K in the unit of the input by that of the "

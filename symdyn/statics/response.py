@@ -30,6 +30,11 @@ class Response:
 
     outputs   names of its rows: outputs, or states of a system without; inputs: names of its columns
     units     of outputs and inputs by name
+
+    >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+    >>> response = linear.response([1.0, 10.0], outputs="q1")
+    >>> response.H.shape, response.omega.tolist()
+    ((2, 1, 1), [1.0, 10.0])
     """
 
     title: str
@@ -49,16 +54,32 @@ class Response:
 
     @property
     def gain(self) -> np.ndarray:
-        """|H|, (n, n_y, n_in)."""
+        """|H|, (n, n_y, n_in).
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+        >>> np.round(linear.response([1.0, 10.0], outputs="q1").gain[:, 0, 0], 6)
+        array([0.904594, 0.009881])
+        """
         return np.abs(self.H)
 
     @property
     def phase(self) -> np.ndarray:
-        """The angle of H, without jumps by turns, rad, (n, n_y, n_in)."""
+        """The angle of H, without jumps by turns, rad, (n, n_y, n_in).
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+        >>> np.round(linear.response([1.0, 10.0], outputs="q1").phase[:, 0, 0], 6)
+        array([3.141593, 3.141593])
+        """
         return np.asarray(np.unwrap(np.angle(self.H), axis=0))
 
     def plot(self, path: PathName | None = None) -> Figure:
-        """The Bode diagram, gains over phases with a column for each input, as a figure; saved to a path. Needs matplotlib."""
+        """The Bode diagram, gains over phases with a column for each input, as a figure; saved to a path. Needs matplotlib.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+        >>> figure = linear.response([1.0, 10.0], outputs="q1").plot()
+        >>> [axes.get_ylabel() for axes in figure.axes]
+        ['gain, output by input', 'phase [°]']
+        """
         from symdyn.pictures.bode import plot
 
         return plot(self, path)

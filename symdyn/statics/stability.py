@@ -53,6 +53,10 @@ class Stability:
     evidence     sentences: what was checked and found; reason: the last of them
     motion       the pair (t, x), t (n,) and x (n, n_x) over a period, where the equations are not constant in the coordinates
                  of the model
+
+    >>> stability = sd.systems.pendulum().compile(backend="numpy").stability({"q1": np.pi})
+    >>> stability.verdict, stability.stable, stability.reason
+    ('unstable', False, 'an exponent is proved positive: 3.13209 1/s')
     """
 
     title: str
@@ -72,7 +76,12 @@ class Stability:
 
     @property
     def stable(self) -> bool | None:
-        """True where the verdict is "stable", False where it is "unstable" or "drifts", else None."""
+        """True where the verdict is "stable", False where it is "unstable" or "drifts", else None.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> print(module.stability({"q1": 0.0}).stable, module.stability({"q1": np.pi}).stable)
+        None False
+        """
         return {"stable": True, "unstable": False, "drifts": False}.get(self.verdict)
 
     def __repr__(self) -> str:

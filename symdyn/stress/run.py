@@ -81,6 +81,10 @@ def stress(system: Any = None, short: bool = False, checks: str | Sequence[str] 
     mechanism that cannot be compiled or evaluated at its start.
     Raises ArgumentError for an unknown check or name, something that is no mechanism and parameters without numbers, ModelError
     for a description with faults; Interrupted, a KeyboardInterrupt with the report of what is finished.
+
+    >>> report = sd.stress(sd.systems.pendulum(), short=True, checks="units")
+    >>> report.passed
+    True
     """
     if isinstance(jobs, bool) or not isinstance(jobs, Integral) or jobs < 1:
         raise ArgumentError(f"jobs is {jobs!r}; pass a number of processes, 1 or more")

@@ -71,6 +71,9 @@ def names(constrained: bool | None = None) -> list[str]:
 
     constrained   True: of mechanisms with loops or constraints only; False: of trees only; those that float, with the loads
                   of water and wind, and those that touch are in neither
+
+    >>> sd.systems.names(constrained=False)[:3]
+    ['pendulum', 'double_pendulum', 'n_link_pendulum']
     """
     return list(_CATALOGUE if constrained is None else _CONSTRAINED if constrained else _TREES)
 
@@ -79,6 +82,9 @@ def get(name: str, **options: object) -> System:
     """The system of this name, with the options of its function.
 
     Raises SymdynError for a name that the catalogue does not have.
+
+    >>> sd.systems.get("n_link_pendulum", n=3).name
+    'n_link_pendulum_3'
     """
     if not isinstance(name, str) or name not in _CATALOGUE:
         near = difflib.get_close_matches(name_of(name), _CATALOGUE, n=3, cutoff=0.5)

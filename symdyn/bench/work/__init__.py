@@ -55,6 +55,10 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    sharply
 
     Raises ArgumentError that lists everything that is wrong with what is asked for; SymdynError if nothing can be measured.
+
+    >>> found = sd.bench("pendulum", ["embedding"], methods=["dop853"], tolerances=[1e-6], end=1.0, repeats=1)
+    >>> [(row.method, row.tolerance) for row in found.rows]
+    [('dop853', 1e-06)]
     """
     from symdyn.bench.work.asked import checked
     from symdyn.bench.work.benchmark import run

@@ -341,7 +341,14 @@ class Solution:
         return Sensitivity(self, self._asked.names, self._asked.columns, self._columns.reshape(len(self.t), -1, self._sizes.x))
 
     def states_and_columns(self, t: Times) -> tuple[np.ndarray, np.ndarray]:
-        """States at any times of the motion, as by a call, (..., n_x), with the sensitivities, (..., n_columns, n_x)."""
+        """States at any times of the motion, as by a call, (..., n_x), with the sensitivities, (..., n_columns, n_x).
+
+        >>> module = sd.systems.pendulum().compile()
+        >>> motion = module.simulate((0, 1), sensitivities=["l", "q1(0)"])
+        >>> x, columns = motion.states_and_columns([0.0, 0.5])
+        >>> x.shape, columns.shape
+        ((2, 2), (2, 2, 2))
+        """
         found = self._at(t)
         return found[..., :self._sizes.x], found[..., self._sizes.x:].reshape(*found.shape[:-1], -1, self._sizes.x)
 
