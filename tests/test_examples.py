@@ -1,12 +1,15 @@
-"""Examples in docstrings of what users call: there is one for each, and they give what they say."""
+"""Examples in docstrings: each class, function, method and property of the reference has one that gives what it says."""
 
 from __future__ import annotations
 
 import doctest
 import functools
+import importlib
 import inspect
+import re
 from collections.abc import Iterator
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,30 +19,91 @@ import symdyn as sd
 from symdyn.formulation.equations import Equations
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
-from symdyn.statics.linearize import Linearization
 
-# Methods that other parts of symdyn call; a Campbell diagram needs a rotor, which tests/runtime/test_campbell.py has.
-WITHOUT = {"Module.following", "Module.motions_at", "Module.split_outputs", "Module.unit", "Module.noting", "Module.campbell",
-           "Solution.states_and_columns", "Solution.input_slopes"}
-
-
-def _public() -> Iterator[tuple[str, Any]]:
-    for name in sd.__all__:
-        thing = getattr(sd, name)
-        error = inspect.isclass(thing) and issubclass(thing, Exception)
-        if (inspect.isclass(thing) and not error) or inspect.isfunction(thing):
-            yield f"sd.{name}", thing
-    for owner in (sd.System, Equations, Module, Solution):
-        for name, thing in vars(owner).items():
-            called = isinstance(thing, (property, functools.cached_property)) or inspect.isfunction(thing)
-            if called and not name.startswith("_") and f"{owner.__name__}.{name}" not in WITHOUT:
-                yield f"{owner.__name__}.{name}", thing
-    for name, thing in vars(Linearization).items():
-        if not name.startswith("_") and ">>>" in (inspect.getdoc(thing) or ""):
-            yield f"Linearization.{name}", thing
+REFERENCE = Path(__file__).parents[1] / "docs" / "reference"
+ENTRY = re.compile(r"^\.\. auto(\w+):: (\S+)\n((?: +:\S.*\n?)*)", re.MULTILINE)
+# Members without an underscore that other parts of symdyn call, and that the reference leaves out.
+LEFT_OUT = {"Convention.faults", "Equations.watched", "Fit.of", "Module.following", "Module.motions_at", "Module.unit",
+            "Samples.record", "Solution.input_slopes", "Table.beyond", "Table.pieces"}
 
 
-PUBLIC = dict(_public())
+class Entry(NamedTuple):
+    """What a line of the reference's pages asks autodoc for: its kind, what it is about, and its options."""
+
+    kind: str
+    path: str
+    options: dict[str, tuple[str, ...]]
+
+
+def entries() -> Iterator[Entry]:
+    for page in sorted(REFERENCE.glob("*.rst")):
+        for kind, path, lines in ENTRY.findall(page.read_text(encoding="utf-8")):
+            options = {name: tuple(value.replace(",", " ").split()) for name, value in re.findall(r":([\w-]+):(.*)", lines)}
+            yield Entry(kind, path, options)
+
+
+def resolved(path: str) -> Any:
+    """A module, or what it has under a dotted name."""
+    names = path.split(".")
+    for k in range(len(names), 0, -1):
+        try:
+            found = importlib.import_module(".".join(names[:k]))
+        except ModuleNotFoundError:
+            continue
+        return functools.reduce(getattr, names[k:], found)
+    raise ModuleNotFoundError(path)
+
+
+def documented() -> Iterator[tuple[str, Any]]:
+    """The names of the reference, as autodoc lists them, with the objects that have their docstrings."""
+    for kind, path, options in entries():
+        thing = resolved(path)
+        if kind != "module":
+            yield path, thing
+        if "members" in options:
+            yield from _members(path, thing, options)
+
+
+def _members(path: str, owner: Any, options: dict[str, tuple[str, ...]]) -> Iterator[tuple[str, Any]]:
+    module = inspect.ismodule(owner)
+    names = options["members"] or (getattr(owner, "__all__", None) if module else None) or vars(owner)
+    for name in names:
+        thing = inspect.getattr_static(owner, name)
+        if name.startswith("_") or name in options.get("exclude-members", ()) or not _behaves(thing):
+            continue
+        if module and not options["members"] and "imported-members" not in options and thing.__module__ != path:
+            continue
+        yield f"{path}.{name}", thing
+        if module and inspect.isclass(thing):
+            yield from _members(f"{path}.{name}", thing, {**options, "members": ()})
+
+
+def _behaves(thing: Any) -> bool:
+    kinds = property, functools.cached_property, staticmethod, classmethod
+    return isinstance(thing, kinds) or inspect.isfunction(thing) or inspect.isclass(thing)
+
+
+def _raised(thing: Any) -> bool:
+    return inspect.isclass(thing) and issubclass(thing, Exception)
+
+
+# Errors and warnings are raised, not called, and have no examples.
+PUBLIC = {name: thing for name, thing in documented() if not _raised(thing)}
+
+
+def test_the_reference_has_every_public_name() -> None:
+    """Of the package, and of the classes whose members it lists; so that what has an example here is all that users call."""
+    things = [id(resolved(name)) for name, _ in documented()]
+    named = {name: getattr(sd, name) for name in sd.__all__}
+    assert [name for name, thing in named.items() if _behaves(thing) and id(thing) not in things] == []
+    listed = {path: resolved(path) for kind, path, options in entries() if kind == "class" and "members" in options}
+    assert {sd.System, Equations, Module, Solution} < set(listed.values())
+    missing = {f"{owner.__name__}.{name}" for path, owner in listed.items() for name, thing in vars(owner).items()
+               if _behaves(thing) and not name.startswith("_") and f"{path}.{name}" not in PUBLIC}
+    assert missing <= LEFT_OUT
+    left_out = {name for _, _, options in entries() for name in options.get("exclude-members", ())}
+    # Frames and rates have entries of their own, below the module's.
+    assert left_out - {"Frame", "rate"} == {name.partition(".")[2] for name in LEFT_OUT}
 
 
 @pytest.fixture(autouse=True)
@@ -48,13 +112,16 @@ def _apart(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
 
 
-# The binary of an FMU has headers.
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.native] * (name == "Module.to_fmu")) for name in PUBLIC])
-def test_an_example_gives_what_it_says(name: str) -> None:
-    text = inspect.getdoc(PUBLIC[name]) or ""
+def example(name: str) -> doctest.DocTest:
     known = {"sd": sd, "np": np, "sp": sp}
-    example = doctest.DocTestParser().get_doctest(text, known, name, None, 0)
-    assert example.examples, f"{name} has no example"
+    return doctest.DocTestParser().get_doctest(inspect.getdoc(PUBLIC[name]) or "", known, name, None, 0)
+
+
+# The binary of an FMU has headers.
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.native] * name.endswith(".to_fmu")) for name in PUBLIC])
+def test_an_example_gives_what_it_says(name: str) -> None:
+    shown = example(name)
+    assert shown.examples, f"{name} has no example"
     said: list[str] = []
-    doctest.DocTestRunner(verbose=False).run(example, out=said.append)
+    doctest.DocTestRunner(verbose=False).run(shown, out=said.append)
     assert not said, "".join(said)

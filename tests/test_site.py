@@ -17,8 +17,9 @@ from urllib.parse import unquote
 import pytest
 
 import symdyn as sd
-from tests.checks import walk
+from tests.checks import public_names, walk
 from tests.helpers import CONTRAST, browser
+from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
 # As wide as screens, with and without the contents of a page at its side, and as a telephone.
@@ -68,6 +69,14 @@ def test_every_public_name_has_an_entry(site: Path) -> None:
     for method in ("symdyn.System.add_joint", "symdyn.runtime.module.Module.simulate",
                    "symdyn.runtime.solutions.solution.Solution.plot"):
         assert f'id="{method}"' in text and f"#{method}" in listed, method
+
+
+def test_every_entry_of_the_reference_is_tested_to_have_an_example(site: Path) -> None:
+    """Nothing else has an entry than what tests/test_examples.py has examples of, fields of its classes, errors, and the time."""
+    kinds = public_names.objects(public_names.entries(site))
+    others = {name for name, kind in kinds.items() if kind in ("exception", "data", "attribute")}
+    assert set(kinds) - others == set(PUBLIC)
+    assert all(public_names.runs(name) for name in others if kinds[name] == "attribute")
 
 
 def test_docstrings_are_typeset(site: Path) -> None:
@@ -249,7 +258,7 @@ def test_measured_figures_are_rows_of_tables(site: Path) -> None:
     assert "<td><p>double_pendulum</p></td>\n<td><p>10 s</p></td>" in page and "<td><p>spatial_chain(12)</p></td>" in page
     assert "<td><p>spatial_chain(7): operations of the right-hand side</p></td>\n<td><p>1191</p></td>" in page
     counted = unescape(re.sub("<[^>]+>", "", (site / "index.html").read_text(encoding="utf-8")))
-    assert "public names have an entry in the reference" in counted and "have an example that runs" in counted
+    assert "public names of the package have an entry in the reference" in counted and "have an example that runs" in counted
 
 
 def test_the_walk_tries_what_the_pages_print(site: Path) -> None:

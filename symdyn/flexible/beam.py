@@ -79,7 +79,12 @@ class Beam:
 
     @cached_property
     def modal(self) -> ModalBody:
-        """The integrals over the table and the shapes."""
+        """The integrals over the table and the shapes.
+
+        >>> beam = sd.Beam([0, 1], mass_per_length=2.0, stiffness=50.0, shapes=1, length=3.0)
+        >>> round(float(beam.modal.m), 6)
+        6.0
+        """
         names = tuple(shape.name or f"mode {k}" for k, shape in enumerate(self.shapes, start=1))
         basis = Basis(self.shapes, AXES[self.axis][:2], self.table.length, self._scale)
         X = np.linspace(0, self.table.length, self._draw)

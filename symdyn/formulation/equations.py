@@ -96,6 +96,12 @@ class Equations:
     contact_groups   those whose pairs are found along a motion
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
+
+    >>> equations = sd.systems.pendulum().embedding()
+    >>> equations.name, equations.formulation
+    ('pendulum', 'embedding')
+    >>> equations.M_tilde
+    Matrix([[l**2*m]])
     """
 
     name: str

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 class ForceSystem(NamedTuple):
     """A force (3,), N, at a point, and the moment about it (3,), N m.
 
-    >>> sd.frames.equivalent_force_system([10.0, 0.0, 0.0], r=[0.0, 2.0, 0.0]).force
-    array([10.,  0.,  0.])
+    >>> at_G = sd.frames.equivalent_force_system([10.0, 0.0, 0.0], r=[0.0, 2.0, 0.0])
+    >>> at_G.force, at_G.moment
+    (array([10.,  0.,  0.]), array([  0.,   0., -20.]))
     """
 
     force: Any

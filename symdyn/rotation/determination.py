@@ -66,7 +66,11 @@ class EulerSolutions(Sequence[Any]):
 
     @property
     def fixed(self) -> str | np.ndarray:
-        """A sentence on what R fixes; with leading axes an array of sentences."""
+        """A sentence on what R fixes; with leading axes an array of sentences.
+
+        >>> sd.rotation.to_euler(sd.rotation.from_euler("ZYX", [0.3, np.pi / 2, 0.1]), "ZYX").fixed
+        'psi - phi = 0.2; each alone is free'
+        """
         of = EulerSequence(self.sequence)
         if not isinstance(self.locked, np.ndarray):
             return _sentence(of, self.locked, self.distance, self.sign, self.value)
@@ -78,6 +82,10 @@ class EulerSolutions(Sequence[Any]):
         """The member (3,) of the family with this first, or this third, angle, rad.
 
         Raises RotationError if the rotation is not at gimbal lock, where no angle is free, or not one of the two is given.
+
+        >>> locked = sd.rotation.to_euler(sd.rotation.from_euler("ZYX", [0.3, np.pi / 2, 0.1]), "ZYX")
+        >>> np.round(locked.at(first=0.5), 6)
+        array([0.5     , 1.570796, 0.3     ])
         """
         if (first is None) == (third is None):
             raise RotationError("at gimbal lock one angle is free: pass either first= or third=, and not both")

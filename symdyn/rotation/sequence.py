@@ -21,8 +21,11 @@ class Lock(NamedTuple):
     second     the two values of the second angle in (-pi, pi], rad, SymPy numbers
     fixed      what is fixed at each: the sum or the difference of the first and third angle
 
-    >>> sd.rotation.gimbal_lock("ZXZ").second
-    (0, pi)
+    >>> lock = sd.rotation.gimbal_lock("ZXZ")
+    >>> lock.sequence, lock.second
+    ('ZXZ', (0, pi))
+    >>> lock.fixed
+    ('phi + psi', 'phi - psi')
     """
 
     sequence: str

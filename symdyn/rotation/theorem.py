@@ -34,7 +34,11 @@ class AxisAngle(NamedTuple):
 
     @property
     def note(self) -> str:
-        """What of axis and angle is arbitrary; with leading axes, of how many rotations."""
+        """What of axis and angle is arbitrary; with leading axes, of how many rotations.
+
+        >>> sd.rotation.axis_angle(np.eye(3)).note
+        'the angle is 0: there is no rotation, and the axis is arbitrary'
+        """
         if isinstance(self.angle, (np.ndarray, float)):
             angle = np.asarray(self.angle)
             zero, half = int((abs(angle) <= ROUNDING).sum()), int((abs(angle - np.pi) <= ROUNDING).sum())

@@ -1158,10 +1158,10 @@ class Module:
         """The user's outputs by name from the rows of the function `outputs`.
 
         >>> system = sd.systems.pendulum()
-        >>> system.add_output("tip", sd.position("bob"))
+        >>> system.add_output("tip", sd.position("bob", [0, -1]))
         >>> module = system.compile(backend="numpy")
         >>> module.split_outputs(module.evaluate("outputs", 0.0, [0.0, 0.0]))["tip"]
-        array([0., 0.])
+        array([ 0., -1.])
         """
         result, start = {}, 0
         for name, shape in self.metadata.outputs:

@@ -115,10 +115,9 @@ class Campbell:
         >>> spin = system.add_joint(sd.Revolute("spin", gimbal, disc, phi, axis=[0, 0, 1]))
         >>> system.add_joint_force(x, -50 * a)
         >>> system.add_joint_force(y, -72 * b)
-        >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [0.0, 2.0])
+        >>> diagram = system.compile(backend="numpy").campbell("phi_dot", [2.0])
         >>> np.round(diagram.damping, 9) + 0.0
-        array([[0., 0.],
-               [0., 0.]])
+        array([[0., 0.]])
         """
         size = np.abs(self.eigenvalues)
         return np.asarray(np.where(size > 0, -self.eigenvalues.real / np.where(size > 0, size, 1.0), 0.0))

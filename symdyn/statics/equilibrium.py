@@ -99,10 +99,21 @@ class Equilibrium:
 
     @property
     def module(self) -> Module:
+        """The module whose state it is.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.equilibrium().module is module
+        True
+        """
         return self.point.module
 
     @property
     def t(self) -> float:
+        """The time, s.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(t=2.0).t
+        2.0
+        """
         return self.point.t
 
     @property
@@ -117,14 +128,30 @@ class Equilibrium:
 
     @property
     def q(self) -> np.ndarray:
+        """Coordinates, (n_q,).
+
+        >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0})
+        >>> np.round(rest.q, 6)
+        array([3.141593])
+        """
         return self.point.q
 
     @property
     def u(self) -> np.ndarray:
+        """Speeds, (n_u,).
+
+        >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}).u
+        array([0.])
+        """
         return self.point.u
 
     @property
     def z(self) -> np.ndarray:
+        """Extra states, (n_z,).
+
+        >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}).z.shape
+        (0,)
+        """
         return self.point.z
 
     @property
@@ -151,6 +178,13 @@ class Equilibrium:
 
     @property
     def inputs(self) -> np.ndarray:
+        """Inputs in order, with those that were solved for, (n_in,).
+
+        >>> module = sd.systems.cart_pole().compile(backend="numpy")
+        >>> rest = module.equilibrium(free=["q1", "F"], fixed={"q1": 0.0}, start={"q2": 0.0}, inputs={"F": 1.0})
+        >>> np.round(rest.inputs, 9) + 0.0
+        array([0.])
+        """
         return self.point.inputs
 
     @property
@@ -285,7 +319,9 @@ class Equilibrium:
         """The state as a table, with what was solved for, and whether it is stable.
 
         >>> rest = sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0})
-        >>> print("\n".join(rest.describe().splitlines()[1:]))
+        >>> for line in rest.describe().splitlines()[1:]:
+        ...     print(line)
+        ...
           q1   =      3.1415927 rad
           an exponent is proved positive: 3.13209 1/s
         """

@@ -124,18 +124,47 @@ class Linearization:
 
     @property
     def A(self) -> np.ndarray:
+        """The matrix of the states, (m, m).
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
+        >>> np.round(linear.A, 6) + 0.0
+        array([[ 0.  ,  1.  ],
+               [-9.81,  0.  ]])
+        """
         return self._manifold.matrices[0]
 
     @property
     def B(self) -> np.ndarray:
+        """The matrix of the inputs, (m, n_in); errors as for `state_space`.
+
+        >>> linear = sd.systems.cart_pole().compile(backend="numpy").linearize({"q2": np.pi})
+        >>> np.round(linear.B.T, 6) + 0.0
+        array([[ 0.      ,  0.      ,  0.97561 , -1.463415]])
+        """
         return self.state_space.B
 
     @property
     def C_out(self) -> np.ndarray:
+        """The outputs by the states, (n_y, m); errors as for `state_space`.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_output("tip", sd.position("bob", [0, -1]))
+        >>> linear = system.compile(backend="numpy").linearize({"q1": 0.0})
+        >>> np.round(linear.C_out, 6) + 0.0
+        array([[1., 0.],
+               [0., 0.]])
+        """
         return self.state_space.C
 
     @property
     def D(self) -> np.ndarray:
+        """The outputs by the inputs, (n_y, n_in); errors as for `state_space`.
+
+        >>> system = sd.systems.cart_pole()
+        >>> system.add_output("pushed", 3 * sd.inputs("F"))
+        >>> system.compile(backend="numpy").linearize({"q2": np.pi}).D
+        array([[3.]])
+        """
         return self.state_space.D
 
     @property
@@ -143,7 +172,7 @@ class Linearization:
         """Names of the rows of C_out and D.
 
         >>> system = sd.systems.pendulum()
-        >>> system.add_output("tip", sd.position("bob"))
+        >>> system.add_output("tip", sd.position("bob", [0, -1]))
         >>> system.compile(backend="numpy").linearize({"q1": 0.0}).outputs
         ('tip[0]', 'tip[1]')
         """
@@ -437,7 +466,9 @@ class Linearization:
         """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables.
 
         >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
-        >>> print("\n".join(linear.describe().splitlines()[1:4]))
+        >>> for line in linear.describe().splitlines()[1:4]:
+        ...     print(line)
+        ...
         A                  q1 [rad]  q1_dot [rad/s]
         q1 [rad]                  0               1
         q1_dot [rad/s]        -9.81               0

@@ -72,6 +72,11 @@ class Stability:
 
     @property
     def reason(self) -> str:
+        """The last sentence of the evidence, which decides.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").stability({"q1": np.pi}).reason
+        'an exponent is proved positive: 3.13209 1/s'
+        """
         return self.evidence[-1]
 
     @property
