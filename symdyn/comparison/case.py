@@ -218,7 +218,7 @@ class Case:
         """All formulas, with their slides.
 
         Raises CaseError with every fault: what has a wrong type, names that `derived` lacks, no formulas, names used twice.
-        What the functions of a formula raise later is a CaseError too.
+        Errors that the functions of a formula raise later become CaseErrors, too.
 
         >>> q = sp.Symbol("q")
         >>> formula = sd.Formula("double angle", sp.sin(2 * q), 2 * sp.sin(q) * sp.cos(q))

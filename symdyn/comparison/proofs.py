@@ -32,7 +32,7 @@ Entries = Sequence[tuple[int, ...]] | None
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a proof measured: the largest residual of the printed formula and of the right one, and whether that proves it.
+    """Residuals that a proof measured, the largest of the printed formula and of the right one, and whether that proves it.
 
     >>> q = sp.Symbol("q")
     >>> proof = sd.proofs.other("sin 2q = 2 sin q cos q", sp.sin(2 * q))

@@ -74,7 +74,7 @@ class Ensemble:
 
     @property
     def samples(self) -> np.ndarray:
-        """What was sampled, (count, n_names).
+        """The sampled values, (count, n_names).
 
         >>> import tempfile
         >>> module = sd.systems.pendulum().compile(backend="numpy")

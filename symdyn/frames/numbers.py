@@ -26,7 +26,7 @@ def numbers(value: Scalar | sp.MatrixBase, values: Motions | None = None, t: Tim
     """The number of an expression, or the numbers of a matrix.
 
     values   symbol or name -> number, or an expression in sd.t and other symbols that have values, from which rates
-             follow (q: 2*sd.t also gives q.dot = 2); with an array t also a function of t. What is not used is left out
+             follow (q: 2*sd.t also gives q.dot = 2); with an array t also a function of t. Values that are not used are ignored
     t        a time in s, or an array of times (n_t,); without it sd.t may stand in values
     Returns a float for an expression, (n,) for a column, (m, n) for a matrix; with an array t the times come first. With an
     array t a number is a constant motion, with rate 0; at one instant its rate is a value of its own.

@@ -154,7 +154,7 @@ class AccelerationParts(_Parts):
 
 @dataclass(frozen=True, repr=False)
 class InertialForces(_Parts):
-    """What is added to the forces in a moving frame: m a_rel = F + total; (3, 1) each, N.
+    """The forces that a moving frame adds to the others: m a_rel = F + total; (3, 1) each, N.
 
     origin        -m a_O
     euler         -m alpha x r

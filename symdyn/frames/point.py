@@ -130,7 +130,7 @@ class Point:
 
     def inertial_forces(self, mass: Scalar, frame: Axes | None = None, components: Axes | None = None,
                         inertial: Axes | None = None) -> InertialForces:
-        """What an observer in a moving frame b must add to the forces: m a_rel = F + total; N.
+        """The forces that an observer in a moving frame b must add to the others: m a_rel = F + total; N.
 
         mass         kg
         frame        the moving frame b; default: the frame in which the point is given

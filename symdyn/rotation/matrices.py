@@ -138,8 +138,8 @@ def skew(v: Vector) -> Array:
 def vee(S: Matrix) -> Array:
     """v (3,) with S = skew(v): the inverse of skew; numbers may have leading axes.
 
-    Raises ArgumentError if numbers are not skew-symmetric to 1e-9 of their size. Of expressions with symbols this is not
-    checked: entries (3, 2), (1, 3) and (2, 1) are taken.
+    Raises ArgumentError if numbers are not skew-symmetric to 1e-9 of their size. Expressions with symbols are not checked:
+    entries (3, 2), (1, 3) and (2, 1) are taken.
 
     >>> sd.rotation.vee(sd.rotation.skew([1.0, 2.0, 3.0]))
     array([1., 2., 3.])

@@ -65,10 +65,10 @@ def from_parameters(p: Vector) -> Array:
 def to_parameters(R: Matrix) -> Array:
     """Euler parameters (4,), theta0 first, of a rotation R (3, 3); numbers may have leading axes.
 
-    Of p and -p, which are the same rotation, that with theta0 > 0, or with the first of theta1, theta2, theta3 that is not
-    zero positive. Numbers by the largest component, so that no digits are lost at any angle. Expressions with symbols by
-    theta0 = sqrt(1 + trace R) / 2, which holds for every angle but pi (there, if R is so for all values of its symbols, by
-    another component).
+    The same rotation has the parameters p and -p: taken are those with theta0 > 0, or where theta0 is zero those whose first
+    component that is not zero is positive. Numbers by the largest component, so that no digits are lost at any angle.
+    Expressions with symbols by theta0 = sqrt(1 + trace R) / 2, which holds for every angle but pi (there, if R is so for all
+    values of its symbols, by another component).
     Raises NotARotation if |R^T R - 1| of numbers has an entry above 1e-9, det R < 0, or R is not (3, 3).
     Source: lecture, chapter 4.5.
 

@@ -34,7 +34,7 @@ class AxisAngle(NamedTuple):
 
     @property
     def note(self) -> str:
-        """What of axis and angle is arbitrary; with leading axes, of how many rotations.
+        """A sentence on what is arbitrary of axis and angle; with leading axes, of how many rotations.
 
         >>> sd.rotation.axis_angle(np.eye(3)).note
         'the angle is 0: there is no rotation, and the axis is arbitrary'

@@ -51,7 +51,7 @@ DOUBLED, HALVED = 60, 200
 
 
 class Carried(NamedTuple):
-    """What a contact carries at rest.
+    """The load that a contact carries at rest.
 
     mode     "open", "sticking" or "sliding"
     force    along its normal and tangents, N, (1 + n_tangents,): where forces are not unique those of least norm that are

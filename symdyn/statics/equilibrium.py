@@ -228,7 +228,7 @@ class Equilibrium:
 
     @property
     def eigenvalues(self) -> np.ndarray:
-        """Of the linearization, what is held left out, by size, (m,) complex, 1/s; of a periodic motion its exponents.
+        """Those of the linearization without what is held, by size, (m,) complex, 1/s; of a periodic motion its exponents.
 
         Raises ArgumentError with the reason where there are none (a singular configuration).
 
@@ -254,7 +254,7 @@ class Equilibrium:
 
     @property
     def reason(self) -> str:
-        """What the verdict rests on, in a sentence with numbers.
+        """The reason of the verdict, in a sentence with numbers.
 
         >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}, params={"l": 9.81}).reason
         'an exponent is proved positive: 1 1/s'
@@ -294,7 +294,7 @@ class Equilibrium:
 
     @property
     def message(self) -> str:
-        """What was found, in a sentence.
+        """The result in a sentence.
 
         >>> sd.systems.pendulum().compile(backend="numpy").equilibrium(start={"q1": 3.0}).message.partition(" after")[0]
         'unstable equilibrium'

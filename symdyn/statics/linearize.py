@@ -219,7 +219,7 @@ class Linearization:
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
-        """Of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion.
+        """Those of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion.
 
         >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0})
         >>> sorted(np.round(linear.eigenvalues.imag, 6).tolist())

@@ -40,7 +40,7 @@ KINDS = ("rest", "steady motion", "periodic motion")
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """What small disturbances of a motion do; prints as a page.
+    """The fate of small disturbances of a motion; prints as a page.
 
     verdict      "stable" (all exponents proved negative), "neutral" (none positive, zero ones without Jordan blocks), "drifts"
                  (with a Jordan block: a disturbance grows with time), "unstable" (one proved positive), "not decided" (rounding

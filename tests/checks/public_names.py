@@ -59,9 +59,9 @@ def main(site: Path) -> int:
     kinds = objects(text)
     shown = [name for name, kind in kinds.items() if kind not in ("exception", "data")]
     bad = [name for name in shown if not runs(name)]
-    report(len(shown) - len(bad), len(shown), "classes, functions, methods, properties and fields of the reference have an example that "
-           "runs", bad)
-    print(f"{list(kinds.values()).count('exception')} errors and warnings of the reference are raised, not called, and have none")
+    what = "classes, functions, methods, properties and fields of the reference have an example that runs"
+    report(len(shown) - len(bad), len(shown), what, bad)
+    print(f"{list(kinds.values()).count('exception')} errors and warnings of the reference are raised, not called, and need none")
     unlisted = [name for name in PUBLIC if name not in kinds]
     if unlisted:
         print(f"names that the pages ask for and the site lacks: {', '.join(unlisted)}")
