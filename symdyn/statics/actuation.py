@@ -57,6 +57,14 @@ class Actuation:
     residuals     (n_u,) of M u_dot + k - F + C_r^T lam by speed, N or N m; residual: the largest of them
     freedoms      independent speeds that the constraints leave; rank: how many of them the inputs that were sought drive
     condition     of the input matrix with columns of length 1, along what it drives; 1 without inputs
+
+    >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+    >>> system = sd.System("cart")
+    >>> cart = system.add_body("cart", mass=1)
+    >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+    >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+    >>> force["tau"], force.unique
+    (3.0, True)
     """
 
     module: Module
@@ -75,22 +83,58 @@ class Actuation:
 
     @property
     def residual(self) -> float:
-        """Largest force or moment that is left, N or N m."""
+        """Largest force or moment that is left, N or N m.
+
+        >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+        >>> system = sd.System("cart")
+        >>> cart = system.add_body("cart", mass=1)
+        >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+        >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+        >>> force.residual
+        0.0
+        """
         return float(np.abs(np.asarray(self.residuals)).max(initial=0.0))
 
     @property
     def lam(self) -> np.ndarray:
-        """Multipliers in order, (n_c,); the force of the constraints is -C_r^T lam."""
+        """Multipliers in order, (n_c,); the force of the constraints is -C_r^T lam.
+
+        >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+        >>> system = sd.System("cart")
+        >>> cart = system.add_body("cart", mass=1)
+        >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+        >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+        >>> force.lam.shape
+        (0,)
+        """
         return np.asarray(self.multipliers)
 
     @property
     def found(self) -> tuple[str, ...]:
-        """Names of the inputs that were sought."""
+        """Names of the inputs that were sought.
+
+        >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+        >>> system = sd.System("cart")
+        >>> cart = system.add_body("cart", mass=1)
+        >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+        >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+        >>> force.found
+        ('tau',)
+        """
         return tuple(n for n in self.inputs.names[0] if n not in self.kept)
 
     @property
     def unique(self) -> bool:
-        """Whether no other values of the inputs that were sought make the motion (near these, where they enter nonlinearly)."""
+        """Whether no other values of the inputs that were sought make the motion (near these, where they enter nonlinearly).
+
+        >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+        >>> system = sd.System("cart")
+        >>> cart = system.add_body("cart", mass=1)
+        >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+        >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+        >>> force.unique
+        True
+        """
         return self.rank == len(self.found)
 
     def __getitem__(self, name: Key) -> float:
@@ -103,7 +147,18 @@ class Actuation:
                             f"{', '.join([*self.inputs.names[0], *self.multipliers.names[0]]) or 'none'}")
 
     def describe(self) -> str:
-        """Inputs with units, multipliers, what is left, rank and condition, as a table."""
+        """Inputs with units, multipliers, what is left, rank and condition, as a table.
+
+        >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
+        >>> system = sd.System("cart")
+        >>> cart = system.add_body("cart", mass=1)
+        >>> system.add_joint_force(system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0])), tau)
+        >>> force = system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[3.0])
+        >>> print(force.describe())
+        cart: inputs that make the motion at t = 0 s, unique
+          tau  =               3 N
+        residual 0 N or N m, rank 1 of 1 freedoms, condition 1
+        """
         units = self.module.metadata.units
         known = [*self.inputs.names[0], *self.multipliers.names[0]]
         width = max([4, *map(len, known)])

@@ -40,6 +40,10 @@ class Equilibria:
     found        each with a name
     counts       from how many starts each was found; iterations: of each start, in order, -1 where none was found
     failures     (start, message) of starts that led nowhere
+
+    >>> found = sd.systems.pendulum().compile(backend="numpy").equilibria(10)
+    >>> sorted(rest.verdict for rest in found)
+    ['neutral', 'unstable']
     """
 
     title: str
@@ -59,7 +63,12 @@ class Equilibria:
 
     @property
     def stable(self) -> tuple[Equilibrium, ...]:
-        """The stable ones."""
+        """The stable ones.
+
+        >>> found = sd.systems.pendulum().compile(backend="numpy").equilibria(10)
+        >>> [abs(round(float(rest["q1"]), 6)) for rest in found.stable]
+        [0.0]
+        """
         return tuple(e for e in self.found if e.stable)
 
     def __repr__(self) -> str:

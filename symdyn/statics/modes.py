@@ -64,6 +64,11 @@ class Mode:
     whirl        from -1 to 1: how round displacements go about the axis of a rotor, positive in the sense of its rotation; 0
                  where translation and tilt go in opposite senses
     whirls       the same of translation and of tilt apart; 0 of what takes no part
+
+    >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+    >>> mode = linear.modes()[0]
+    >>> mode.name, round(mode.omega, 9), round(mode.period / np.pi, 9)
+    ('q1', 1.0, 2.0)
     """
 
     eigenvalue: complex
@@ -80,37 +85,72 @@ class Mode:
 
     @property
     def sense(self) -> str:
-        """Which way the mode goes round with respect to the rotation, seen from the fixed frame; see `sense_of`."""
+        """Which way the mode goes round with respect to the rotation, seen from the fixed frame; see `sense_of`.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> linear.modes()[0].sense
+        ''
+        """
         return sense_of(self.whirl, self.whirls)
 
     @property
     def omega(self) -> float:
-        """|eigenvalue|, natural frequency without its damping, rad/s."""
+        """|eigenvalue|, natural frequency without its damping, rad/s.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> round(linear.modes()[0].omega, 9)
+        1.0
+        """
         return abs(self.eigenvalue)
 
     @property
     def frequency(self) -> float:
-        """|eigenvalue| / 2 pi, Hz."""
+        """|eigenvalue| / 2 pi, Hz.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> round(2 * np.pi * linear.modes()[0].frequency, 9)
+        1.0
+        """
         return self.omega / (2 * np.pi)
 
     @property
     def damped_frequency(self) -> float:
-        """|Im eigenvalue| / 2 pi: what a free decay shows, Hz."""
+        """|Im eigenvalue| / 2 pi: what a free decay shows, Hz.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> round(2 * np.pi * linear.modes()[0].damped_frequency, 9)
+        1.0
+        """
         return abs(self.eigenvalue.imag) / (2 * np.pi)
 
     @property
     def period(self) -> float:
-        """Of the damped oscillation, s; infinite for real eigenvalues."""
+        """That of the damped oscillation, s; infinite for real eigenvalues.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> round(linear.modes()[0].period / np.pi, 9)
+        2.0
+        """
         return 1 / self.damped_frequency if self.eigenvalue.imag else np.inf
 
     @property
     def time_constant(self) -> float:
-        """1 / |Re eigenvalue|: the time in which it changes by a factor e, s; infinite if it neither grows nor decays."""
+        """1 / |Re eigenvalue|: the time in which it changes by a factor e, s; infinite if it neither grows nor decays.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> linear.modes()[0].time_constant
+        inf
+        """
         return 1 / abs(self.eigenvalue.real) if self.eigenvalue.real else np.inf
 
     @property
     def damping(self) -> float:
-        """Damping ratio, -Re / |eigenvalue|; 0 of a zero eigenvalue."""
+        """Damping ratio, -Re / |eigenvalue|; 0 of a zero eigenvalue.
+
+        >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
+        >>> round(linear.modes()[0].damping, 9) + 0.0
+        0.0
+        """
         return 0.0 - self.eigenvalue.real / self.omega if self.kind != "zero" else 0.0
 
     def __repr__(self) -> str:

@@ -65,6 +65,10 @@ class BatchSolution:
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is
     seconds    what the integration took
     columns    derivatives, of runs that were asked for them, see `sensitivity`
+
+    >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
+    >>> motions.x.shape, motions.q.shape
+    ((2, 1, 2), (2, 1, 1))
     """
 
     metadata: ModuleMetadata
@@ -84,6 +88,11 @@ class BatchSolution:
         """Derivatives of the states by what `simulate_batch` was asked for, by name, see BatchSensitivity.
 
         Raises ArgumentError if it was not asked for any.
+
+        >>> module = sd.systems.pendulum().compile()
+        >>> motions = module.simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1), sensitivities=["l"])
+        >>> motions.sensitivity["l"].shape
+        (2, 1, 2)
         """
         if self.columns is None:
             raise ArgumentError(f"{self.metadata.name}: these motions have no sensitivities; pass simulate_batch(..., "
@@ -92,12 +101,24 @@ class BatchSolution:
 
     @property
     def q(self) -> np.ndarray:
-        """Coordinates, (n, n_t, n_q)."""
+        """Coordinates, (n, n_t, n_q).
+
+        >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
+        >>> np.round(motions.q[:, 0], 6)
+        array([[-0.099993],
+               [-0.19997 ]])
+        """
         return self.x[..., :self.metadata.sizes.q]
 
     @property
     def u(self) -> np.ndarray:
-        """Speeds, (n, n_t, n_u)."""
+        """Speeds, (n, n_t, n_u).
+
+        >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
+        >>> np.round(motions.u[:, 0], 6)
+        array([[-0.003585],
+               [-0.01081 ]])
+        """
         sizes = self.metadata.sizes
         return self.x[..., sizes.q:sizes.q + sizes.u]
 
