@@ -1062,8 +1062,8 @@ class _Phases:
         return sites
 
     def _share_in_space(self, of: Sequence[int]) -> bool:
-        """Whether contacts are some that stick in space and share forces, with others that stick or have no load alone: where some
-        slide, loads of those that stick are no longer put where they hold."""
+        """Whether contacts are some that stick in space and share forces, and no other slides under a load: where one does, loads
+        of those that stick are no longer put where they hold."""
         if any(mode == SLIDING and self.tangents[k] and not self._is_light(k) for k, mode in enumerate(self.modes)):
             return False
         shared = self.shared or any(map(self._is_light, range(len(self.records))))
