@@ -7,12 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from matplotlib.colors import to_rgb
 
-from symdyn.datafile.expressions import Wrong, parsed
-from symdyn.model.contacts.grid import grid_spline, piece_spline
-from symdyn.model.surroundings import ABSCISSAE
 from symdyn.pictures.meshes import Color, Part, line, prism, ribbon, sheet
 
 # The normal, which points to the bodies, and normal @ point of the points of the plane, m; n-frame.
@@ -197,6 +193,12 @@ def _graph(kind: str, height: Callable[..., np.ndarray], places: np.ndarray, rea
 
 def _height(record: Mapping[str, Any]) -> Callable[..., np.ndarray] | None:
     """A height or radius as a function of arrays; None where its text is no expression that is known here."""
+    import sympy as sp  # where there are curves: pictures of kept modules need no SymPy
+
+    from symdyn.datafile.expressions import Wrong, parsed
+    from symdyn.model.contacts.grid import grid_spline, piece_spline
+    from symdyn.model.surroundings import ABSCISSAE
+
     given, numbers = record["height"], record["values"]["parameters"][0]
     if not isinstance(given, str):
         knots, coefficients = [np.array(t) for t in given["knots"]], np.array(given["coefficients"])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from scipy.spatial import ConvexHull
 
 from symdyn.pictures.painter import Camera, cut, order, planes
 from symdyn.pictures.solids import Solids, Water
@@ -111,9 +110,12 @@ class Scene(PolyCollection):
         """What is seen through: the areas within its outlines, and its lines, from back to front."""
         areas, lines = _Pieces(1.0, self._opacity * _GLASS_ALPHA), _Pieces(self._opacity)
         glass = [(part, places) for part, places in zip(self._solids.parts, self._places, strict=True) if part.glass]
-        if glass:
-            way = camera.toward(np.concatenate(self._places).mean(axis=0))
-            glass.sort(key=lambda one: -camera.distance(one[1].mean(axis=0), way))
+        if not glass:
+            return areas, lines
+        from scipy.spatial import ConvexHull  # other pictures of kept modules need no SciPy
+
+        way = camera.toward(np.concatenate(self._places).mean(axis=0))
+        glass.sort(key=lambda one: -camera.distance(one[1].mean(axis=0), way))
         for part, places in glass:
             flat = camera.project(places)
             outline = flat[ConvexHull(flat).vertices]
