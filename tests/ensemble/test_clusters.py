@@ -321,7 +321,8 @@ def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, mo
 
 def test_a_time_limit_that_is_too_short_for_all_is_no_fault(tmp_path, capsys, queue, monkeypatch):
     monkeypatch.setattr(slurm, "submit", lambda folder, text: "7")
-    predict = prediction.predict
+    predict, measure = prediction.predict, prediction.measure
+    monkeypatch.setattr(prediction, "measure", lambda *given: replace(measure(*given), start=2.0))  # since this process began
     monkeypatch.setattr(prediction, "predict", lambda *given: replace(predict(*given), wall=1000.0))
     path = write(tmp_path, table="[cluster]\nkind = \"slurm\"\ntime = 00:05:00\n")
     assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 0
