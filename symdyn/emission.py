@@ -72,7 +72,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads, rolled=rolled)
 
 
-def rolling(rolled: Any) -> Rolling:
+def rolling(rolled: object) -> Rolling:
     """The option as it is given. Raises SymdynError for another value."""
     if rolled is True or rolled is False:
         return rolled is True

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from symdyn.cli.messages import INTERRUPTED, Stop
 from symdyn.counting import counted
@@ -219,7 +219,7 @@ def ends_on_sign(shared: bool) -> Iterator[None]:
         return
     received: list[int] = []
 
-    def interrupt(number: int, frame: Any) -> None:
+    def interrupt(number: int, frame: object) -> None:
         received.append(number)
         raise KeyboardInterrupt
 

@@ -145,7 +145,7 @@ def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: A
     return Plan(setting, drawn, whole(chunk, "chunk", module))
 
 
-def whole(value: Any, what: str, module: Module) -> int | None:
+def whole(value: object, what: str, module: Module) -> int | None:
     """A whole number from 1 on, or None. Raises ArgumentError for anything else."""
     if value is None:
         return None

@@ -396,8 +396,7 @@ class _Table:
             return None
         if least and not self.broken(only, lam[None], w[None]).any():
             return Solved(modes, lam, w, True)
-        active = np.flatnonzero(np.any([of[0] for of in self.active], axis=0))
-        H, fixed = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.fixed))
+        H, fixed, active = self._only()
         cones, rows_of = [], np.zeros(len(lam))
         for site, mode in zip(self.sites, modes, strict=True):
             rows_of[list(site.rows)] = float(np.diag(self.D)[list(site.rows)].sum())
@@ -411,17 +410,22 @@ class _Table:
             return None
         return Solved(modes, found.lam, w, True, found.softness, found.softness is None)
 
+    def _only(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """H, fixed and the places of the active unknowns of the only combination."""
+        H, fixed = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.fixed))
+        return H, fixed, np.flatnonzero(np.any([of[0] for of in self.active], axis=0))
+
     def unloaded(self, lam: np.ndarray) -> list[int]:
         """Sites that nothing presses in the only combination, whose rows depend on each other, however forces are shared; lam:
         forces of least norm."""
         from scipy.optimize import linprog
 
-        H, active = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.active))
-        _, s, V = np.linalg.svd((self.D @ H)[active > 0][:, active > 0])
+        H, _, active = self._only()
+        _, s, V = np.linalg.svd((self.D @ H)[np.ix_(active, active)])
         places = [k for k, (site, (mode,)) in enumerate(zip(self.sites, self.options, strict=True))
                   if site.normal is not None and mode.held]
         normals, force = [self.sites[k].rows[0] for k in places], float(np.abs(lam).max(initial=0.0))
-        free = H[normals][:, active > 0] @ V[s <= DEPENDENT * s[:1]].T
+        free = H[normals][:, active] @ V[s <= DEPENDENT * s[:1]].T
         if not places or not force or float(lam[normals].min()) > NOISE * force:
             return []
         # As many forces as can be: the largest sum of parts from 0 to 1, in LIGHT of the largest force, that are below them.

@@ -15,14 +15,14 @@ def test_predictions_next_to_sweeps(capsys):
     pytest.importorskip("pyarrow")
     pytest.importorskip("zarr")
     assert predictions.run(rows=100_000, part=0.01) == 0
-    told = capsys.readouterr().out.splitlines()
-    rows = [line.split("|") for line in told if line.startswith(("short", "loop", "traces"))]
+    said = capsys.readouterr().out.splitlines()
+    rows = [line.split("|") for line in said if line.startswith(("short", "loop", "traces"))]
     assert [int(row[0].split()[1]) for row in rows] == [1000, 64, 81]
     for row in rows:
         expected, found = map(float, row[3].split())
         assert expected == pytest.approx(found, rel=0.2, abs=0.11)  # MB, to one digit
         assert all(float(x) > 0 for x in row[1].split()) and all(float(x) > 10 for x in row[4].split())
-    merged = [re.findall(r"npz \S+ s and (\d+) MB more", line) for line in told if "rows of five numbers" in line]
+    merged = [re.findall(r"npz \S+ s and (\d+) MB more", line) for line in said if "rows of five numbers" in line]
     assert len(merged) == 2 and all(int(found[0]) < 20 for found in merged)
 
 

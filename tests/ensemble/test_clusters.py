@@ -112,10 +112,10 @@ def test_faults_of_the_cluster_are_among_the_others(tmp_path, capsys):
     path = write(tmp_path, "tt = 1\ndask = \"tcp://a:1\"\nformats = [\"hdf5\"]",
                  "[cluster]\nkind = \"slurm\"\nworkers = 0\ntime = 04:00:00\n")
     assert main(["sweep", path]) == 2
-    told = capsys.readouterr().err
+    said = capsys.readouterr().err
     for fault in ("has 4 faults", "tt: not known", "formats: must be of parquet, zarr, found ['hdf5']; ensemble.npz is written",
                   "cluster and dask: slurm and Dask are both", "cluster.workers: must be a whole number from 1 on, found 0"):
-        assert fault in told, told
+        assert fault in said, said
 
 
 @pytest.mark.parametrize("more, arguments, message", [
@@ -136,8 +136,8 @@ def test_faults_of_the_cluster_are_among_the_others(tmp_path, capsys):
 def test_a_command_that_contradicts_the_file_or_itself(tmp_path, capsys, monkeypatch, more, arguments, message):
     monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
     assert main(["sweep", write(tmp_path, more), "--output", str(tmp_path / "out"), *arguments]) == 2
-    told = capsys.readouterr().err
-    assert message in told and not (tmp_path / "out").exists(), told
+    said = capsys.readouterr().err
+    assert message in said and not (tmp_path / "out").exists(), said
 
 
 @pytest.mark.parametrize("address, here", [
@@ -254,8 +254,8 @@ def test_a_sweep_under_slurm_is_the_same_with_a_worker_that_is_killed(tmp_path, 
     asked = {"count": 1200, "chunk": 20, "table": "[cluster]\nkind = \"slurm\"\nworkers = 2\nlease = 1\ntime = 00:10:00\n"}
     path, out = write(tmp_path, **asked), tmp_path / "out"
     assert main(["sweep", path, "--output", str(out), "--no-picture"]) == 0
-    told = capsys.readouterr().out
-    assert "Slurm's job 1 with 2 workers computes 1200 samples in 60 chunks" in told and "scancel 1 stops it" in told
+    said = capsys.readouterr().out
+    assert "Slurm's job 1 with 2 workers computes 1200 samples in 60 chunks" in said and "scancel 1 stops it" in said
     waited(queue / "1_1.pid")
     while not (queue / "1.done").exists() and (
             len(list((out / "chunks").glob("0*.npz"))) < 5 or len(list((out / "workers").glob("*.json"))) < 2):
@@ -280,8 +280,8 @@ def test_a_sweep_under_slurm_is_the_same_with_a_worker_that_is_killed(tmp_path, 
 def test_what_slurm_rejects_is_reported_in_its_own_words(tmp_path, capsys, queue, monkeypatch):
     path = write(tmp_path, table="[cluster]\nkind = \"slurm\"\npartition = \"full\"\n")
     assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr().err
-    assert "sbatch rejects the job: sbatch: error: invalid partition specified: full; correct [cluster] in the sweep file" in told
+    said = capsys.readouterr().err
+    assert "sbatch rejects the job: sbatch: error: invalid partition specified: full; correct [cluster] in the sweep file" in said
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main(["sweep", path, "--output", str(tmp_path / "out"), "--resume", "--backend", "numpy"]) == 2
     assert "holds another ensemble" in capsys.readouterr().err
@@ -297,8 +297,8 @@ def test_workers_are_not_submitted_twice(tmp_path, capsys, queue):
     with Claims(out, "other") as other:
         other.take(["00000004"])
         assert main(["sweep", path, "--output", str(out), "--resume"]) == 2
-    told = capsys.readouterr().err
-    assert "1 chunk of" in told and "is being computed by workers; --status shows them, and sbatch" in told
+    said = capsys.readouterr().err
+    assert "1 chunk of" in said and "is being computed by workers; --status shows them, and sbatch" in said
     assert not list(queue.iterdir())
 
 
@@ -313,9 +313,9 @@ def test_what_the_cluster_gives_and_does_not_suffice(tmp_path, capsys, queue, mo
     path = write(tmp_path, table=f"[cluster]\nkind = \"slurm\"\n{table}\n")
     for command in (["--dry-run"], []):
         assert main(["sweep", path, "--output", str(tmp_path / "out"), *command]) == 2
-        told = capsys.readouterr().err
-        assert all(message in told for message in messages if "sweep.toml" not in message and "has 2" not in message), told
-    assert all(message in told for message in messages), told
+        said = capsys.readouterr().err
+        assert all(message in said for message in messages if "sweep.toml" not in message and "has 2" not in message), said
+    assert all(message in said for message in messages), said
     assert not list(queue.iterdir()) and not (tmp_path / "out").exists()
 
 
@@ -326,8 +326,8 @@ def test_a_time_limit_that_is_too_short_for_all_is_no_fault(tmp_path, capsys, qu
     monkeypatch.setattr(prediction, "predict", lambda *given: replace(predict(*given), wall=1000.0))
     path = write(tmp_path, table="[cluster]\nkind = \"slurm\"\ntime = 00:05:00\n")
     assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().out
-    assert "the time limit of 5 min ends before: go on with --resume, about 4 times in all, or ask for more workers" in told
+    said = capsys.readouterr().out
+    assert "the time limit of 5 min ends before: go on with --resume, about 4 times in all, or ask for more workers" in said
 
 
 # -- what is predicted
@@ -411,10 +411,10 @@ def test_a_dry_run_for_a_thousand_million_motions_makes_none_of_them(tmp_path, c
     pytest.importorskip("pyarrow")
     before, out = prediction.resident(), str(tmp_path / "out")
     assert main(["sweep", path, "--dry-run", "--count", "1e9", "--workers", "64", "--output", out]) == 0
-    told = capsys.readouterr().out
+    said = capsys.readouterr().out
     for part in ("1,000,000,000 motions for 64 workers of 1 core, predicted from 10 of them", "core hours",
                  "10000 chunks of 100,000", "breaks first", "at the most", "a worker"):
-        assert part in told, told
+        assert part in said, said
     assert prediction.resident() - before < 400e6  # 1e9 samples of two numbers are 16 GB
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep.toml"]
 
@@ -426,8 +426,8 @@ def test_a_grid_has_the_count_of_its_file(tmp_path, capsys):
     assert main(["sweep", str(path), "--dry-run", "--count", "7"]) == 2
     assert "the grid has 3 samples, but the count is 7" in capsys.readouterr().err
     assert main(["sweep", str(path), "--dry-run", "--output", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().out
-    assert "3 motions for 3 workers of 2 cores, predicted from 3 of them" in told and ", cost " in told
+    said = capsys.readouterr().out
+    assert "3 motions for 3 workers of 2 cores, predicted from 3 of them" in said and ", cost " in said
 
 
 # -- a folder
@@ -474,7 +474,7 @@ def test_many_workers_are_listed_up_to_a_number(tmp_path, capsys, monkeypatch):
         (out / "workers" / f"w{k}.json").write_text(json.dumps(
             {"state": "at work" if k else "has left", "begun": 0.0, "now": 10.0, "count": {f"w{k}": k}, "failed": 0, "task": ""}))
     assert main(["sweep", path, "--output", str(out), "--status"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert told[0] == "swing: 0 of 40 samples are done (0 %)"
-    assert told[1] == "4 workers at work: 1 samples a second, about 40 s are left"
-    assert len(told) == 5 and told[2].startswith("  w4: 4 samples, at work, heard of") and told[4] == "  and 3 more"
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "swing: 0 of 40 samples are done (0 %)"
+    assert said[1] == "4 workers at work: 1 samples a second, about 40 s are left"
+    assert len(said) == 5 and said[2].startswith("  w4: 4 samples, at work, heard of") and said[4] == "  and 3 more"

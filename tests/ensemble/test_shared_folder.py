@@ -145,8 +145,8 @@ def test_a_killed_worker_is_replaced_and_a_late_one_helps(tmp_path):
     status = read_status(out)
     assert not status.complete and 12 <= status.n_done < 60 and len(status.workers) == 2
     late = worker(tmp_path, 0.02)
-    told = [process.communicate(timeout=60)[0] for process in (first, late)]
-    assert told == [b"60\n", b"60\n"]
+    said = [process.communicate(timeout=60)[0] for process in (first, late)]
+    assert said == [b"60\n", b"60\n"]
     assert sorted(p.name for p in out.iterdir()) == ["ensemble.npz", "failures.jsonl", "manifest.json"]
     by = Counter(pid for _, pid in lines(tmp_path))
     assert set(by) == {first.pid, second.pid, late.pid}

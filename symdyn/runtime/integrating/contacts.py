@@ -419,7 +419,7 @@ class _Phases:
                 if self.fired:
                     self.x = latest[-1].before.copy()
                 elif until >= last:
-                    self._demand_pressed(start, until, self.x)
+                    self._demand_pressed(until, self.x)
                     break
                 else:
                     self.x, self.fired = self._slipped(until, self.x)
@@ -539,26 +539,26 @@ class _Phases:
         passed = [k for k, own in enumerate(self.events) if self.modes[k] != OPEN and own.get("opens") in self.unlooked]
         if not passed:
             return []
-        forces = self._forces(t, x)
+        forces = self._by_modes(t, x).force
         size = float(np.abs(forces).max(initial=0.0))
         return [(k, "opens") for k in passed if forces[self.normal[k]] < -RESOLVED * size]
 
-    def _demand_pressed(self, start: float, t: float, x: np.ndarray) -> None:
-        """Raise _Stop where a closed contact pulls, at the end of a phase from start on."""
+    def _demand_pressed(self, t: float, x: np.ndarray) -> None:
+        """Raise _Stop where a closed contact pulls, at the end of a phase."""
         closed = [k for k, mode in enumerate(self.modes) if mode != OPEN and self.records[k].normal]
         if not closed or self.shared or not self.pressed:
             return
-        forces = self._forces(t, x)
+        forces = self._by_modes(t, x).force
         size = max(float(np.abs(forces).max(initial=0.0)), self.pressed)
         for k in closed:
             if forces[self.normal[k]] < -MISSED * size:
                 raise _Stop(f"contact {self.records[k].name} pulls by {-forces[self.normal[k]]:.3g} N, since the instant at "
                             "which it opened was missed; give event_spacing, or a finer rtol")
 
-    def _forces(self, t: float, x: np.ndarray, p: np.ndarray | None = None) -> np.ndarray:
-        """Of all rows, by parameters with modes; without, by those with the present ones."""
+    def _by_modes(self, t: float, x: np.ndarray, p: np.ndarray | None = None) -> Numbers:
+        """The numbers by parameters with modes, whose forces act then; without, by those with the present ones."""
         values = self._values(CONTACTS, t, x[:self.request.n_state], self._parameters() if p is None else p)
-        return _numbers_of(self.module.metadata, values).force
+        return _numbers_of(self.module.metadata, values)
 
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note how often the modes change without time passing, and with less and less; raise _Stop where that does not end."""
@@ -930,10 +930,15 @@ class _Phases:
 
     def _a_moment_later(self, t: float, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The time and the state after a part GRACE of the run, by the present modes."""
-        p, n = self._parameters(), self.request.n_state
-        after = min(GRACE * self.begins.length, self.request.span[1] - t)
-        f = self._values("rhs", t, x[:n], p)[:n]
-        return t + after, x[:n] + after / 2 * (f + self._values("rhs", t + after, x[:n] + after * f, p)[:n])
+        p, after = self._parameters(), min(GRACE * self.begins.length, self.request.span[1] - t)
+        return t + after, self._stepped(t, x, self._values("rhs", t, x[:self.request.n_state], p), p, after)
+
+    def _stepped(self, t: float, x: np.ndarray, rate: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
+        """The state after a step h of Heun's method, (n_state,); rate: x_dot at t."""
+        n = self.request.n_state
+        f = rate[:n]
+        found: np.ndarray = x[:n] + h / 2 * (f + self._values("rhs", t + h, x[:n] + h * f, p)[:n])
+        return found
 
     def _rounding(self, at: Numbers) -> float:
         """The speed that rounding of accelerations makes in the run, m/s, which hits nothing."""
@@ -1144,12 +1149,11 @@ class _Phases:
         p, n, end = self._parameters(), self.request.n_state, self.request.span[1]
         places, sizes = [self.events[k][what] for k, what in watched], np.array(list(watched.values()))
         now = self._values("events", t, x[:n], p)[places]
-        f = self._values("rhs", t, x[:n], p)[:n]
+        rate = self._values("rhs", t, x[:n], p).copy()
         unknown, found = now < 0, np.zeros(len(places), dtype=bool)
         after = max(SHORTEST * self.begins.length, 64 * np.finfo(float).eps * abs(t))
         while unknown.any() and after <= min(LONGEST * self.begins.length, end - t):
-            ahead = x[:n] + after / 2 * (f + self._values("rhs", t + after, x[:n] + after * f, p)[:n])
-            change = self._values("events", t + after, ahead, p)[places] - now
+            change = self._values("events", t + after, self._stepped(t, x, rate, p, after), p)[places] - now
             known = unknown & (np.abs(change) > RESOLVED * sizes)
             found |= known & (change < 0)
             unknown &= ~known
@@ -1234,7 +1238,7 @@ class _Phases:
             began = max((since for k, since in self.begins.since.items() if k in held), default=None)
             return self._realigned(t, x, held, p, self._parameters(), began), []
         if self.begins.since:
-            at = _numbers_of(self.module.metadata, self._values(CONTACTS, t, x[:self.request.n_state], self._parameters()))
+            at = self._by_modes(t, x)
             rates: dict[int, float] = {}
             for k in self.begins.since:
                 rates[k] = turning(at, self.tangents[k])
@@ -1243,7 +1247,7 @@ class _Phases:
 
     def _outside(self, t: float, x: np.ndarray, p: np.ndarray) -> list[tuple[int, str]]:
         """Contacts in space that share forces and have left their cones where nothing looked at these."""
-        force, found = self._forces(t, x, p), []
+        force, found = self._by_modes(t, x, p).force, []
         static = self._numbers(t, x).static
         for k, mode in enumerate(self.modes):
             if mode == STICKING and self.records[k].tangents == 2:
