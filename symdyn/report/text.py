@@ -13,6 +13,8 @@ from symdyn.tape.tape import Tape
 
 # What the report counts besides the standard functions where there are constraints.
 OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", "reactions", "position_correction", "velocity_correction")
+# These grow with the square of the number of speeds, or faster: they are counted for so many speeds at most.
+DENSE, MOST_SPEEDS = ("mass_matrix", "J", "C_r"), 150
 # The right-hand side by the numeric algorithm, which takes over where a pivot vanishes.
 OTHERWISE = "rhs, algorithm"
 
@@ -113,16 +115,22 @@ def report(equations: Equations, backend: str, fallback: str = "", source: Sourc
     from symdyn.functions.table import STANDARD
     from symdyn.functions.tapes import function_tape, has_function
 
-    rows = []
+    s = equations.symbols
+    rows, left_out = [], []
     for name in (*STANDARD, *OF_CONSTRAINTS * bool(equations.constraints)):
-        if has_function(equations, name):
+        if has_function(equations, name) and name in DENSE and len(s.speeds) > MOST_SPEEDS:
+            left_out.append(name)
+        elif has_function(equations, name):
             rows.append(_row(name, function_tape(equations, name)))
             if name == "rhs" and equations.otherwise is not None:
                 rows.append(_row(OTHERWISE, function_tape(equations.otherwise, name)))
-    s = equations.symbols
     sizes = {"coordinates": len(s.coordinates), "speeds": len(s.speeds), "extra states": len(s.states),
              "inputs": len(s.inputs), "parameters": len(s.parameters)}
     if equations.constraints:
         sizes["constraints"] = len(equations.constraints)
+    notes = skipped(equations)
+    if left_out:
+        notes.append(f"{', '.join(left_out)}: not counted, as their entries grow with the square of the {len(s.speeds)} speeds; "
+                     "they are derived when they are asked for")
     return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
-                  tuple(skipped(equations)), equations.candidates, rolled=rolled_rows(source) if source is not None else ())
+                  tuple(notes), equations.candidates, rolled=rolled_rows(source) if source is not None else ())

@@ -78,7 +78,7 @@ class _Balancer:
     def _sum(self, node: Node) -> Any:
         """The terms, two by two, those that are ready first."""
         r = self.recorder
-        heap = [(self._time(self._of(term)), k, sign, self._of(term)) for k, (sign, term) in enumerate(self._terms(node, 1))]
+        heap = [(self._time(self._of(term)), k, sign, self._of(term)) for k, (sign, term) in enumerate(self._terms(node))]
         heapq.heapify(heap)
         count = len(heap)
         while len(heap) > 1:
@@ -92,14 +92,18 @@ class _Balancer:
         _, _, sign, total = heap[0]
         return total if sign > 0 else r.neg(total)
 
-    def _terms(self, node: Node, sign: int) -> Iterator[tuple[int, Any]]:
-        for a, s in zip(node.args, (sign, sign if node.op == "add" else -sign), strict=True):
-            core = unsigned(a)
-            s = -s if core is not a else s
-            if core in self.inner:
-                yield from self._terms(core, s)
+    def _terms(self, node: Node) -> Iterator[tuple[int, Any]]:
+        """Signs and terms in their order; without recursion, as a sum over all links of a long chain is that deep."""
+        waiting: list[tuple[int, Any]] = [(1, node)]
+        while waiting:
+            sign, value = waiting.pop()
+            core = unsigned(value)
+            sign = -sign if core is not value else sign
+            if core is node or core in self.inner:
+                first, second = core.args
+                waiting += (sign if core.op == "add" else -sign, second), (sign, first)
             else:
-                yield s, core
+                yield sign, core
 
     def _time(self, value: Any) -> int:
         """When a value is ready."""

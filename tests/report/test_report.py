@@ -86,3 +86,11 @@ def test_multipliers_are_left_out_where_accelerations_do_without():
         steps = set(equations.tape("rhs").steps)
         needed = any(e in steps for e in equations.quantity("lam"))
         assert (told in str(equations.compile(backend="numpy").report())) == (not needed)
+
+
+def test_matrices_of_many_speeds_are_left_out_with_a_note():
+    """The report of a chain of 200 links takes seconds, not minutes."""
+    few, many = (sd.systems.n_link_pendulum(n).compile(backend="numpy").report() for n in (20, 200))
+    assert {"mass_matrix", "J"} <= {row.function for row in few.rows} and "not counted" not in str(few)
+    assert {row.function for row in few.rows} - {row.function for row in many.rows} == {"mass_matrix", "J"}
+    assert "mass_matrix, J: not counted, as their entries grow with the square of the 200 speeds; they are derived" in str(many)

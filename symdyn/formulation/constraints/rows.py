@@ -25,7 +25,7 @@ from symdyn.model.orientation import EulerParameters
 from symdyn.model.quantity import of_speeds
 from symdyn.model.symbols import Coordinate, symbols_of
 from symdyn.model.uses import unit_of
-from symdyn.spatial.vectors import dot, inner, vector, zeros
+from symdyn.spatial.vectors import dot, inner, vector
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT, PARAMETER, TIME, Node, is_zero
@@ -128,7 +128,7 @@ class Gathered:
         kept, places = [], []
         for row in closure_rows(a, joint, P, Q, self.model.planar):
             along = row.along(P, Q)
-            jacobian = along if self.tree.plain else along @ self.tree.D if len(along) else zeros(len(self.model.speeds))
+            jacobian = self.tree.by_speeds(along[None])[0]
             unit = "m" if row.length else "rad"
             full = Row(row.label, row.value, jacobian, inner(along, self.tree.w), row.remaining(P, Q), unit)
             if self._add(full, closes=True):

@@ -55,7 +55,7 @@ def base(tree: Tree, speed_rates: np.ndarray, a_0: np.ndarray) -> Base:
     """
     if tree.parallel:  # parameters are constants in body-fixed axes only
         tree = build(tree.model, tree.algebra)
-    w_dot = tree.D @ speed_rates + tree.b
+    w_dot = tree.joint_accelerations(speed_rates)
     places = [Pose(k, identity(), zeros(3)) for k in range(len(tree.links))]
     Y = project(tree, regressor(tree, w_dot, a_0, places))
     values = [e for link in tree.links for e in entries(link.effective)]

@@ -43,7 +43,7 @@ class Identification:
     def regressor(self) -> np.ndarray:
         """Y, (n_u, 10 n_b): ten parameters of every body in the order of the model, see inertial_parameters."""
         tree = self.tree
-        return tree.algebra.name("Y", project(tree, regressor(tree, tree.D @ self.speed_rates + tree.b, self._upwards())))
+        return tree.algebra.name("Y", project(tree, regressor(tree, tree.joint_accelerations(self.speed_rates), self._upwards())))
 
     @cached_property
     def base(self) -> Base:

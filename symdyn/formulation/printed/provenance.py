@@ -169,7 +169,7 @@ class OfBodies:
         """Body, J in the n-frame (6, n_u), mass, inertia about the centre of mass in n-frame axes."""
         of, algebra = self.of, self.of.algebra
         for pose, body in zip(of.tree.poses, of.model.bodies, strict=True):
-            J = of.kinematics.jacobian(pose, algebra.constants(body.com)) @ of.tree.D
+            J = of.tree.by_speeds(of.kinematics.jacobian(pose, algebra.constants(body.com)))
             R = of.kinematics.rotation(pose)
             yield body, J, algebra.expression(body.mass), R @ algebra.matrix(body.inertia) @ R.T
 

@@ -168,6 +168,7 @@ class _Position:
                 self.values.update({q.name: e / math.hypot(*p) for q, e in zip(joint.coordinates[-4:], p, strict=True)})
         self._twists: dict[int, dict[int, np.ndarray]] = {}
         self._directions: dict[int, np.ndarray] = {}
+        self._of_inertia: dict[tuple[Any, ...], np.ndarray] = {}  # like bodies have the same nodes
 
     def squares(self, k: int, p: int, after: Sequence[int]) -> tuple[float, float]:
         """Of the velocity that speed p gives to link k, in directions in which it has mass; and of its part that velocities by
@@ -200,13 +201,23 @@ class _Position:
         if self.solid:
             return np.eye(6)
         if k not in self._directions:
-            link, added = self.tree.links[k], self.tree.added_to(k)
-            m, h, I = self.numbers(np.array(link.inertia.m, dtype=object), link.inertia.h, link.inertia.I)
-            whole = ArticulatedInertia.rigid(Inertia(m[()], h, I)).matrix()
+            inertia, added = self.tree.links[k].inertia, self.tree.added_to(k)
+            parts = [np.array(inertia.m, dtype=object), inertia.h, inertia.I]
             if added is not None:
-                whole = whole + ArticulatedInertia(*self.numbers(added.A, added.H, added.M)).matrix()
-            self._directions[k] = np.linalg.qr(_floats(_independent(whole)).T)[0].T
+                parts += [added.A, added.H, added.M]
+            asked = tuple(entry for part in parts for entry in part.ravel())
+            if asked not in self._of_inertia:
+                self._of_inertia[asked] = self._in_numbers(parts)
+            self._directions[k] = self._of_inertia[asked]
         return self._directions[k]
+
+    def _in_numbers(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """The same of an inertia, and of an added mass, given by their parts in nodes."""
+        m, h, I, *added = self.numbers(*parts)
+        whole = ArticulatedInertia.rigid(Inertia(m[()], h, I)).matrix()
+        if added:
+            whole = whole + ArticulatedInertia(*added).matrix()
+        return np.linalg.qr(_floats(_independent(whole)).T)[0].T
 
     def numbers(self, *arrays: np.ndarray) -> list[np.ndarray]:
         """Arrays of nodes in numbers of 40 digits; parameters of the default 0 are 0."""

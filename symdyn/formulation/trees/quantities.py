@@ -187,7 +187,7 @@ class TreeQuantities(Motion):
     def inverse_dynamics(self) -> np.ndarray:
         """M_tilde u_dot + k_tilde - F_tilde by one pass, without the mass matrix."""
         applied = self.loads.applied()
-        w_dot = self.tree.D @ self.speed_rates + self.tree.b if len(self.tree.w) else self.tree.b
+        w_dot = self.tree.joint_accelerations(self.speed_rates)
         tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches)
         return self.algebra.name("tau", self.project(tau - applied.joint))
 
@@ -210,7 +210,7 @@ class TreeQuantities(Motion):
         for pose, body in zip(self.tree.poses, self.model.bodies, strict=True):
             with self.algebra.section(f"body {body.name}: velocity transformation J"):
                 J = self.kinematics.jacobian(pose, self.algebra.constants(body.com))
-                J = J @ self.tree.D if J.shape[1] else zeros(6, len(self.speeds))
+                J = self.tree.by_speeds(J)
                 rows.append(J[[0, 1, 5]] if self.model.planar else J)
         return np.vstack(rows) if rows else zeros(0, len(self.speeds))
 
@@ -300,8 +300,7 @@ class TreeQuantities(Motion):
 
     def joint_accelerations(self) -> np.ndarray:
         """w_dot, (n_w,)."""
-        ud = self.recall("accelerations")
-        return self.tree.D @ ud + self.tree.b if len(ud) and len(self.tree.w) else self.tree.b
+        return self.tree.joint_accelerations(self.recall("accelerations"))
 
     def energy(self) -> np.ndarray:
         """Kinetic energy; potential energy of gravity and springs, J."""
@@ -387,8 +386,7 @@ class TreeQuantities(Motion):
         elif point.quantity == "velocity":
             rows = kinematics.velocity(pose, at)
         elif point.quantity == "jacobian":
-            rows = kinematics.jacobian(pose, at)
-            rows = rows @ self.tree.D if rows.shape[1] else zeros(6, len(self.speeds))
+            rows = self.tree.by_speeds(kinematics.jacobian(pose, at))
         elif point.quantity == "bias_acceleration":
             rows = kinematics.acceleration(pose, at, kinematics.reference)
         else:

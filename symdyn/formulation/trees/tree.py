@@ -102,10 +102,22 @@ class Tree:
     parallel: int = 0
     lockable: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def plain(self) -> bool:
         """Whether the joint speeds are the generalized speeds themselves."""
         return self.D.shape[0] == self.D.shape[1] and bool(np.all(np.asarray(np.eye(len(self.w), dtype=int) == self.D)))
+
+    def by_speeds(self, rows: np.ndarray) -> np.ndarray:
+        """rows D: what rows (n, n_w) along the joints' speeds are along the generalized ones, (n, n_u)."""
+        if self.plain:
+            return rows
+        return rows @ self.D if rows.shape[1] else zeros(len(rows), self.D.shape[1])
+
+    def joint_accelerations(self, u_dot: np.ndarray) -> np.ndarray:
+        """D u_dot + b: the rates of the joints' speeds."""
+        if self.plain:
+            return u_dot + self.b
+        return self.D @ u_dot + self.b if self.D.size else self.b
 
     @cached_property
     def drivers(self) -> tuple[frozenset[int], ...]:
