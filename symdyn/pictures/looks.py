@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -129,8 +130,13 @@ class Mechanism:
         return [*[of(name) for _, *ends, _ in self.joints for name in ends], *range(n_b), *range(n_b),
                 *[of(name) for _, *ends, _ in self.connections for name in ends]]
 
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {name: k for k, name in enumerate(self.bodies)}
+
     def index(self, name: str) -> int:
-        return list(self.bodies).index(name) if name in self.bodies else GROUND
+        """The place of the body of that name, or of the ground for another name."""
+        return self._places.get(name, GROUND)
 
     def local(self, body: int, point: np.ndarray) -> np.ndarray:
         """A point of the n-frame in the axes of a body."""

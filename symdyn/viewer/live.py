@@ -14,7 +14,7 @@ from symdyn.emission import emit
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.constraints.augmented import augment
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.trees.embedding import embed
+from symdyn.formulation.trees.recursive import recursive
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of, with_surroundings
@@ -41,7 +41,7 @@ _CLOSURE = ("C", "C_r", "N")
 def show(system: System, path: Any = None, params: Numbers | None = None, q: Values | None = None) -> View:
     """A page with the mechanism of a system, see System.show."""
     model = system.check()
-    equations: Equations = system.augmented() if model.loops or model.constraints else system.embedding()
+    equations = _equations(model)
     names = [n for n in _POSES if n in equations.quantities]
     closes = any(equations.holonomic)
     values, missing = _values(equations, params, q)
@@ -58,10 +58,15 @@ def show(system: System, path: Any = None, params: Numbers | None = None, q: Val
 
 def mechanism_of(model: Model) -> tuple[Mechanism, np.ndarray]:
     """The mechanism of a model at its initial coordinates, its loops as they are there, and the lengths of its shapes."""
-    equations = augment(model) if model.loops or model.constraints else embed(model)
+    equations = _equations(model)
     values, _ = _values(equations, None, None)
     numbers = _evaluate(equations, [n for n in _POSES if n in equations.quantities], values)
     return _mechanism(equations, numbers, values, True), numbers.get("drawn_lengths", np.zeros(0)).ravel()
+
+
+def _equations(model: Model) -> Equations:
+    """Equations to place bodies by: the recursions, which need no mass matrix, or the augmented ones that close loops."""
+    return augment(model) if model.loops or model.constraints else recursive(model)
 
 
 def _values(equations: Equations, params: Any, q: Any) -> tuple[dict[str, float], list[str]]:

@@ -98,10 +98,12 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
         yield from _hull(np.concatenate([base + size[0] * ring, ends[0] + size[0] / 4 * ring]), axes, item.color)
     elif kind == "rod" and np.linalg.norm(ends[1] - ends[0]) < size[0]:  # a wheel: its rim, and the face that is seen
         axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-        half = float(np.linalg.norm(ends[1] - ends[0])) / 2 * (1.0 if axis @ axes[2] > 0 else -1.0)
+        toward = float(axis @ axes[2])
+        half = float(np.linalg.norm(ends[1] - ends[0])) / 2 * (1.0 if toward > 0 else -1.0)
         middle = (ends[0] + ends[1]) / 2
         yield from _hull(middle + _ring(axis, size[0], half), axes, _shaded(item.color, 0.0))
-        yield from _hull(middle + half * axis + _ring(axis, size[0], 0.0), axes, item.color)
+        if abs(toward) > _EDGEWISE:
+            yield from _hull(middle + half * axis + _ring(axis, size[0], 0.0), axes, item.color)
     elif len(ends) == 2 and kind not in ("line", "mooring"):
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
         if kind == "rope":
