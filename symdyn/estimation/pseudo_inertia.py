@@ -22,8 +22,8 @@ from symdyn.errors import EvaluationError
 # By what the weight of the divergence falls from stage to stage; the decrement squared of Newton's method at which a stage ends,
 # and the last one, relative to the weight; steps at most.
 FALL, STAGE, END, MOST_STEPS = 0.1, 0.01, 1e-10, 1000
-# The part of a step below which none is tried, and the decrement that rounding of the sum may leave then.
-LEAST_STEP, ROUNDING = 1e-12, 1e-12
+# The part of a step below which none is tried, and the decrement that rounding of the sum may leave then; that of one operation.
+LEAST_STEP, ROUNDING, EPS = 1e-12, 1e-12, float(np.finfo(float).eps)
 # Places of the ten parameters in J: m, h_x, h_y, h_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz.
 _SYMMETRIC = [(0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
 
@@ -146,7 +146,9 @@ def _stage(A: np.ndarray, b: np.ndarray, charts: list[Chart], at: _At, weight: f
         if length <= LEAST_STEP:
             break
         at, now = moved, value
-    if decrement <= ROUNDING * (1 + now):  # the sum decreases no more, to rounding
+    # The sum decreases no more, to rounding: its own, and that of A x - b, which is large where data have no noise; kept is 1 + x.
+    rounded = EPS * (np.abs(A) @ (1 + np.abs(at.x(charts))) + np.abs(b))
+    if decrement <= ROUNDING * (1 + now) + float(np.sum(rounded**2)):
         return at
     raise EvaluationError(f"no inertial parameters found: Newton's method ended with the decrement squared {decrement:.3g}; take "
                           "a smaller spread, or nominal values nearer to the robot's")

@@ -71,6 +71,17 @@ def test_exact_values_without_noise() -> None:
     assert list(found.values)[:2] == ["I_zz_link1", "h_x_link2"] and found.undetermined == () and found.condition < 20
 
 
+@pytest.mark.parametrize("seed", [None, 1])
+def test_consistent_parameters_without_noise(seed: int | None) -> None:
+    """Forces are met to rounding from nominal values that are right, which are kept, and that are wrong by a fifth."""
+    right = dict(zip(robot().metadata.bodies, true("inertial_parameters").reshape(6, 10), strict=True))
+    found = sd.identify(robot(), measured(0, 0 * NOISE), consistent=True, nominal=right if seed is None else nominal(seed))
+    assert max(np.abs(left).max() for left in found.residuals) < 1e-14 * np.abs(forces()).max()
+    assert all(is_consistent(np.array(list(found.body(body).values()))) for body in robot().metadata.bodies)
+    if seed is None:
+        np.testing.assert_allclose(list(found.values.values()), true("inertial_parameters"), rtol=0, atol=1e-12)
+
+
 def test_covariance_against_many_repetitions() -> None:
     """Errors over 60 repetitions have the distribution that the covariance says, with known and with estimated noise."""
     truth, noise = true("base_parameters"), dict(zip(robot().metadata.u, NOISE, strict=True))
