@@ -5,6 +5,8 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from sympy import sstr
+
 from symdyn.errors import ModelError, SymdynError
 from symdyn.pages import table
 from symdyn.shown import name_of
@@ -37,7 +39,7 @@ def _picture(model: Model) -> str:
 
 
 def _tables(model: Model) -> str:
-    bodies = [(b.name, b.mass, ", ".join(map(str, b.com))) for b in model.bodies]
+    bodies = [(b.name, sstr(b.mass, full_prec=False), ", ".join(sstr(x, full_prec=False) for x in b.com)) for b in model.bodies]
     rows = [(j.name, j.kind, f"{name_of(j.parent)} → {name_of(j.child)}", ", ".join(map(str, j.coordinates)))
             for j in model.joints]
     numbers = [(p, f"{model.defaults[p]:.6g}" if p in model.defaults else "", model.units.get(p, "")) for p in model.parameters]

@@ -418,6 +418,15 @@ def test_a_system_shows_a_picture_and_tables(name: str) -> None:
     assert all(f"<td>{body.name}</td>" in text for body in system.check().bodies[:12])
 
 
+def test_numbers_of_tables_have_the_digits_that_they_were_given() -> None:
+    """0.2 is not 0.200000000000000, by itself and within expressions."""
+    system, m = sd.System("arm", gravity=[0, -9.81]), sd.parameters("m", positive=True)
+    link = system.add_body("link", mass=2.5 + 0.1 * m, inertia=0.5, com=[0.2, 1e-3])
+    system.add_joint(sd.Revolute("hinge", system.ground, link))
+    text = system._repr_html_() or ""
+    assert "<td>link</td><td>0.1*m + 2.5</td><td>0.2, 0.001, 0</td>" in text
+
+
 def test_a_rail_goes_through_its_block() -> None:
     """In the small picture the block is in front of its rail, and does not fill the picture where it is alone."""
     svg = re.search(r"<svg .*?</svg>", sd.systems.vehicle_on_track()._repr_html_() or "")
