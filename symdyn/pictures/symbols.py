@@ -9,6 +9,7 @@ _GREEK = frozenset("alpha beta gamma delta epsilon zeta eta theta iota kappa lam
                    "Gamma Delta Theta Lambda Xi Sigma Phi Psi Omega".split())
 # A letter, Greek or Latin, with an index or without.
 _SYMBOL = re.compile(r"([A-Za-z]+?)(?:_?(\d+)|_([A-Za-z0-9_]+)|)")
+_WORD = re.compile(r"\w+", re.ASCII)
 # Letters that symbols on an axis have together at most.
 _SHORT = 10
 # Digits above the line.
@@ -19,15 +20,19 @@ _ACCENTS = {"_dot": r"\dot", "_ddot": r"\ddot"}
 
 
 def typeset(name: str) -> str:
-    r"""A name in the mathematics of matplotlib: "q1_dot" is $\dot{q}_{1}$; names that are words stay as they are.
+    r"""A name in the mathematics of matplotlib: "q1_dot" is $\dot{q}_{1}$; words stay as they are, with a dot above their rates.
 
-    >>> typeset("theta_2_ddot"), typeset("steer")
-    ('$\\ddot{\\theta}_{2}$', 'steer')
+    >>> typeset("theta_2_ddot"), typeset("steer"), typeset("steer_dot")
+    ('$\\ddot{\\theta}_{2}$', 'steer', '$\\dot{\\mathrm{steer}}$')
     """
     suffix = next((end for end in ("_ddot", "_dot") if name.endswith(end)), "")
     match = _SYMBOL.fullmatch(name.removesuffix(suffix))
     letter = match[1].replace("lamda", "lambda") if match else ""
     if match is None or not (letter in _GREEK or len(letter) == 1):
+        word = name.removesuffix(suffix)
+        if suffix and _WORD.fullmatch(word):
+            escaped = word.replace("_", r"\_")
+            return rf"${_ACCENTS[suffix]}{{\mathrm{{{escaped}}}}}$"
         return name.replace("$", r"\$")
     head = rf"\{letter}" if letter in _GREEK else letter
     if suffix:
@@ -53,7 +58,7 @@ def axis_label(names: Sequence[str], title: str, unit: str) -> str:
 
 def _letters(sign: str) -> int:
     """How many letters and digits a typeset name shows."""
-    without = re.sub(r"\\(mathrm|d?dot)|[${}_]", "", sign)
+    without = re.sub(r"\\(mathrm|d?dot|_)|[${}_]", "", sign)
     return len(re.sub(r"\\[A-Za-z]+", "x", without))
 
 
