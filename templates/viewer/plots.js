@@ -49,8 +49,28 @@ class Plot {
         this.canvas.addEventListener("pointerdown", event => { this.canvas.setPointerCapture(event.pointerId); at(event); });
         this.canvas.addEventListener("pointermove", event => event.buttons ? at(event) : this.hover(place(event)));
         this.canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
+        if (this.marks.length) this.reachable(seek);
         new ResizeObserver(() => this.draw()).observe(this.box);
         matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    }
+
+    // The keyboard goes from mark to mark, and their names are read out.
+    reachable(seek) {
+        this.box.tabIndex = 0;
+        this.box.setAttribute("role", "group");
+        this.box.setAttribute("aria-label", `${this.panel.title || this.panel.names[0]}: arrow keys go to events and changes of modes`);
+        this.tip.setAttribute("role", "status");
+        const times = [...new Set(this.marks.map(({ t }) => t))].sort((a, b) => a - b);
+        this.box.addEventListener("keydown", event => {
+            const { now } = this, to = { ArrowLeft: times.findLast(t => t < now), ArrowRight: times.find(t => t > now),
+                Home: times[0], End: times[times.length - 1] };
+            if (!(event.key in to)) return;
+            event.preventDefault();
+            if (to[event.key] === undefined) return;
+            seek(to[event.key]);
+            this.hover(this.x(to[event.key]));
+        });
+        this.box.addEventListener("blur", () => { this.tip.hidden = true; });
     }
 
     color(k) { return PALETTE[k % PALETTE.length]; }

@@ -124,6 +124,25 @@ def test_marks_are_drawn_and_named_under_the_pointer(landing: Solution, chromium
     assert said == []
 
 
+def test_the_keyboard_goes_from_mark_to_mark(landing: Solution, chromium: Any, tmp_path: Path) -> None:
+    landing.view(tmp_path / "view.html")
+    page, said = opened(chromium, tmp_path / "view.html")
+    curves = page.query_selector(".plot .curves")
+    curves.focus()
+    impact = f"left: impact, left: sliding, right: impact, right: sliding at {LANDS:.4g} s"
+    for key, text, t in (("ArrowRight", "passes at 0.1 s", 0.1), ("ArrowRight", impact, LANDS), ("ArrowLeft", "passes at 0.1 s", 0.1),
+                         ("ArrowLeft", "passes at 0.1 s", 0.1),
+                         ("End", f"left: sticking, right: sticking at {RESTS:.4g} s", RESTS), ("Home", "passes at 0.1 s", 0.1)):
+        page.keyboard.press(key)
+        assert page.is_visible(".plot .tip >> nth=0") and page.text_content(".plot .tip >> nth=0") == text
+        assert float(page.input_value("#player input[type=range]")) == pytest.approx(t, abs=1e-3)
+    assert "arrow keys go to events" in curves.get_attribute("aria-label")
+    page.keyboard.press("Tab")
+    assert not page.is_visible(".plot .tip >> nth=0")
+    page.close()
+    assert said == []
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_curves_are_hidden_and_shown_by_mouse_and_keyboard(dark: bool, landing: Solution, chromium: Any, tmp_path: Path) -> None:
     """x and y in metres: without y the axis ends at the greatest x."""
