@@ -146,7 +146,7 @@ def _stage(A: np.ndarray, b: np.ndarray, charts: list[Chart], at: _At, weight: f
         if length <= LEAST_STEP:
             break
         at, now = moved, value
-    # The sum decreases no more, to rounding: its own, and that of A x - b, which is large where data have no noise; kept is 1 + x.
+    # The sum decreases no more, to rounding: its own, and that of A x - b, large where data have no noise; kept is 1 + x.
     rounded = EPS * (np.abs(A) @ (1 + np.abs(at.x(charts))) + np.abs(b))
     if decrement <= ROUNDING * (1 + now) + float(np.sum(rounded**2)):
         return at

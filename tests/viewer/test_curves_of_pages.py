@@ -130,9 +130,9 @@ def test_the_keyboard_goes_from_mark_to_mark(landing: Solution, chromium: Any, t
     curves = page.query_selector(".plot .curves")
     curves.focus()
     impact = f"left: impact, left: sliding, right: impact, right: sliding at {LANDS:.4g} s"
-    for key, text, t in (("ArrowRight", "passes at 0.1 s", 0.1), ("ArrowRight", impact, LANDS), ("ArrowLeft", "passes at 0.1 s", 0.1),
-                         ("ArrowLeft", "passes at 0.1 s", 0.1),
-                         ("End", f"left: sticking, right: sticking at {RESTS:.4g} s", RESTS), ("Home", "passes at 0.1 s", 0.1)):
+    passes, rests = "passes at 0.1 s", f"left: sticking, right: sticking at {RESTS:.4g} s"
+    for key, text, t in (("ArrowRight", passes, 0.1), ("ArrowRight", impact, LANDS), ("ArrowLeft", passes, 0.1),
+                         ("ArrowLeft", passes, 0.1), ("End", rests, RESTS), ("Home", passes, 0.1)):
         page.keyboard.press(key)
         assert page.is_visible(".plot .tip >> nth=0") and page.text_content(".plot .tip >> nth=0") == text
         assert float(page.input_value("#player input[type=range]")) == pytest.approx(t, abs=1e-3)
