@@ -363,6 +363,9 @@ class _LoopWriter:
         self.before: list[str] = []
         self.after: list[str] = []
         self.n_tables = 0
+        # Steps that the loop reads from an array: those of its own trips must stand there by then.
+        self.read_by_place = {int(number) for (of, *_), a in rolled.arguments.items() if of == k and a.kind == "array"
+                              for number in a.numbers}
         self.outside: dict[tuple[Any, ...], Any] = {}
         self.loads: dict[Node, str] = {}
 
@@ -409,14 +412,14 @@ class _LoopWriter:
                     any(isinstance(s, _Store) and s.op == "store" for s in steps), loop.trips)
 
     def _step(self, r: int, carried: bool) -> list[str]:
-        """The statements of a step that computes something; what is read after the last trip only is kept after it."""
+        """The statements of a step that computes something; what is read after the loop only is kept after it."""
         rolled, loop, node = self.rolled, self.loop, self.nodes[r]
         lines = self.writer.step(node)
         places = rolled.place[loop.begin + r:loop.end:loop.length]
         if places[0] < 0:
             return lines
         line = rolled.stored_at("w", self._index(places), self.writer.printer.text(node))
-        if carried and places[0] == places[1]:
+        if carried and places[0] == places[1] and loop.end - loop.length + r not in self.read_by_place:
             before = next(leaf for key, leaf in self.outside.items() if key[:2] == ("before", r))
             self.after.append(rolled.stored_at("w", str(places[0]), self.writer.text[before]))
             return lines

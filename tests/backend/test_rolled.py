@@ -57,10 +57,10 @@ MADE: dict[str, Callable[[], Equations]] = {
 }
 
 
-def rolled_and_straight(equations: Equations, monkeypatch: pytest.MonkeyPatch, bound: dict[str, float] | None = None
-                        ) -> tuple[Source, Source]:
-    """The right-hand side with loops, and the same steps one after the other in one function, with the same products in sums."""
-    content = content_of(equations, ("rhs",), False, bound or {}, RightSide())
+def rolled_and_straight(equations: Equations, monkeypatch: pytest.MonkeyPatch, bound: dict[str, float] | None = None,
+                        name: str = "rhs") -> tuple[Source, Source]:
+    """A function with loops, and the same steps one after the other in one function, with the same products in sums."""
+    content = content_of(equations, (name,), False, bound or {}, RightSide())
     rolled = render(content, "c", standalone=False, integrator=False, rolled=True)
     read = rendering.read_dialect
 
@@ -76,8 +76,8 @@ def rolled_and_straight(equations: Equations, monkeypatch: pytest.MonkeyPatch, b
         return rolled, render(content, "c", standalone=False, integrator=False, rolled=False)
 
 
-def numbers(source: Source, folder: Path, states: int = 20) -> np.ndarray:
-    """Constants and results of the right-hand side at random states and parameters."""
+def numbers(source: Source, folder: Path, states: int = 20, name: str = "rhs") -> np.ndarray:
+    """Constants and results of a function at random states and parameters."""
     compiler = find_compiler()
     assert compiler is not None
     about, size = source.metadata, source.program.functions[0].size
@@ -94,8 +94,8 @@ def numbers(source: Source, folder: Path, states: int = 20) -> np.ndarray:
         given["c"], out = np.zeros(max(1, source.program.n_c)), np.full(size, np.nan)
         at = {name: array.ctypes.data_as(ctypes.c_void_p) for name, array in {**given, "out": out}.items()}
         assert library[f"{about.name}_prologue"](at["p"], at["c"]) == 0
-        arguments = [ctypes.c_double(0.4) if g == "t" else at[g] for g in about.arguments["rhs"]]
-        assert library[f"{about.name}_rhs"](*arguments, at["out"]) == 0
+        arguments = [ctypes.c_double(0.4) if g == "t" else at[g] for g in about.arguments[name]]
+        assert library[f"{about.name}_{name}"](*arguments, at["out"]) == 0
         results.append(np.concatenate([given["c"], out]))
     return np.array(results)
 
@@ -109,6 +109,15 @@ def test_loops_give_the_bits_of_straight_line_code(name: str, monkeypatch: pytes
     assert not straight.program.functions[0].parts
     found, wanted = numbers(rolled, tmp_path / "rolled"), numbers(straight, tmp_path / "straight")
     assert np.isfinite(found).all() and np.array_equal(found, wanted)
+
+
+@needs_c
+@pytest.mark.parametrize("name", ["position_correction", "velocity_correction"])
+def test_the_last_trip_reads_what_it_has_computed_itself(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    rolled, straight = rolled_and_straight(sd.systems.get("n_four_bar", n=12).augmented(), monkeypatch, name=name)
+    assert "what like bodies repeat" in next(iter(rolled.files.values()))
+    found = numbers(rolled, tmp_path / "rolled", name=name)
+    assert np.isfinite(found).all() and np.array_equal(found, numbers(straight, tmp_path / "straight", name=name))
 
 
 @needs_c
