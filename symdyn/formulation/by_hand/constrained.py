@@ -24,6 +24,11 @@ class ConstrainedByHand(Constrained):
         """1 m: how long the mechanism is, and which of the coordinates are lengths, is not known."""
         return 1
 
+    @cached_property
+    def lever(self) -> Any:
+        """1 m, as the length."""
+        return self.length
+
     @property
     def angular(self) -> list[bool]:
         return [False] * len(self.speeds)

@@ -158,6 +158,10 @@ class ConstrainedTree(Constrained, TreeQuantities):
     def length(self) -> Any:
         return self.gathered.length()
 
+    @cached_property
+    def lever(self) -> Any:
+        return self.gathered.lever()
+
     @property
     def angular(self) -> list[bool]:
         return [turns(self.model.units.get(u)) for u in self.model.speeds]

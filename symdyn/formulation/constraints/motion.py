@@ -34,7 +34,8 @@ VANISHING = Fraction(1, 1000)
 class Constrained(Motion):
     """Mixed in before a Motion: what constraints add to it.
 
-    rows          of the constraints; length: the mechanism's, m; angular: for each speed whether it turns (symdyn.turning)
+    rows          of the constraints; length: the mechanism's, m; lever: what angular speeds are multiplied by to compare them
+                  with others, m; angular: for each speed whether it turns (symdyn.turning)
     kernel        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows
@@ -52,6 +53,10 @@ class Constrained(Motion):
 
     @cached_property
     def length(self) -> Any:
+        raise NotImplementedError
+
+    @cached_property
+    def lever(self) -> Any:
         raise NotImplementedError
 
     @property
@@ -140,17 +145,17 @@ class Constrained(Motion):
     def _least(self, k: int, scaled: bool = False) -> Any:
         """Square of a size of row k so small that it is no constraint any more: positions where it vanishes as a whole.
 
-        scaled   columns of angular speeds are divided by the length
+        scaled   columns of angular speeds are divided by the lever
         """
         row = self.rows[k]
         if row.unit not in POWERS:
             return 0
         turning = not scaled and all(is_zero(e) or turns for e, turns in zip(row.jacobian, self.angular, strict=True))
-        natural = self.length ** POWERS[row.unit] / (1 if turning else self.length)
+        natural = self.lever ** POWERS[row.unit] / (1 if turning else self.lever)
         return VANISHING**2 * (natural * natural)
 
     def _columns(self) -> list[Any]:
-        return [1 / self.length if turning else 1 for turning in self.angular]
+        return [1 / self.lever if turning else 1 for turning in self.angular]
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
         """u_dot and lam."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,35 @@ class Gathered:
                     apply = a.recorder.apply
                     total = apply("select", apply("gt", total, 0), total, 1)
             return 1 if is_zero(total) else a.name("length", a.sqrt(total))
+
+    def lever(self) -> Any:
+        """What angular speeds are multiplied by to compare them with others, m: root mean square of the distances of points of
+        joints on a moving body from the joint that carries it, else of centres of mass, else the length.
+
+        Neither the place of a mechanism nor the number of its bodies enters it, as both enter the length.
+        """
+        a = self.algebra
+        with a.section("length of a lever"):
+            carried = {self._name(j.child): a.constants(j.child_point) for j in self.model.joints}
+            joints = [*self.model.joints, *(j for j in self.model.loops if isinstance(j, Joint))]
+            ends = [(self._name(body), point) for j in joints
+                    for body, point in ((j.parent, j.parent_point), (j.child, j.child_point))]
+            squares = [dot(arm, arm) for body, point in ends if body in carried for arm in [a.constants(point) - carried[body]]]
+            if all(map(is_zero, squares)):
+                squares = [dot(arm, arm) for body in self.model.bodies if body.name in carried
+                           for arm in [a.constants(body.com) - carried[body.name]]]
+            squares = [square for square in squares if not is_zero(square)]
+            if not squares:
+                return self.length()
+            mean = sum(squares[1:], squares[0]) * Fraction(1, len(squares))
+            if isinstance(mean, Node):
+                length, apply = self.length(), a.recorder.apply
+                mean = apply("select", apply("gt", mean, 0), mean, length * length)
+            return a.name("lever", a.sqrt(mean))
+
+    @staticmethod
+    def _name(body: Any) -> str:
+        return str(getattr(body, "name", body))
 
     # -- each kind
 
