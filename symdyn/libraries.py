@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.packed import Places
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source
 from symdyn.emission import emit, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
+from symdyn.functions.packed import places
 from symdyn.functions.table import BATCH
 from symdyn.functions.tapes import all_columns_of
 from symdyn.runtime.building.library import Unit
@@ -82,6 +84,11 @@ class Libraries:
         """Where a matrix of derivatives may differ from zero; None for other functions and for what has no columns."""
         columns = all_columns_of(self.equations, name, RightSide())
         return None if columns is None else columns.structure().reshape(*columns.shape, columns.n)
+
+    @cached_property
+    def places(self) -> Places | None:
+        """Where the derivative of x_dot by x may differ from zero; None where that is unknown."""
+        return places(self.equations)
 
     @cached_property
     def breaks(self) -> Tape | None:

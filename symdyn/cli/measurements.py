@@ -115,6 +115,10 @@ MEASUREMENTS: dict[str, Measurement] = {
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of bodies (default: 10 to 1000)"}),
             _folder("rolled"))),
+    "stiff": Measurement(
+        "symdyn.lab.stiff_cables:run", "stiff cables by sparse and by dense factors; at rest compared with closed forms", (
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of links (default: 10, 100, 1000)"}), _JSON)),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),

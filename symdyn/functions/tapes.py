@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.backend.columns import Columns, Group
+from symdyn.backend.packed import NAME as PACKED
 from symdyn.backend.right_side import RightSide
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.constraints.motion import residual_names
@@ -30,6 +31,7 @@ from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_b
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
 from symdyn.functions import sensitivities as columns
+from symdyn.functions.packed import packed_tape, places
 from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
 from symdyn.tape.balance import balance
 from symdyn.tape.jumps import Jump, jumps
@@ -52,6 +54,8 @@ def has_function(equations: Equations, name: str) -> bool:
         return bool(switches(equations))
     if name in (BOUNDS, RANGES):
         return bool(event_leaves(equations))
+    if name == PACKED:
+        return places(equations) is not None
     if name in columns.COLUMNS:
         return name in columns.functions_of(equations)
     if name in columns.ADJOINTS:
@@ -76,6 +80,8 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape(equations.recorder, {name: Output.of(name, surfaces)})
     if name in (BOUNDS, RANGES):
         return event_bounds(equations, name)
+    if name == PACKED:
+        return packed_tape(equations)
     second = second_named(name)
     if second is not None:
         return Tape(equations.recorder, {name: Output.of(name, weighted(equations, *second))})

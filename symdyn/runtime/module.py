@@ -29,6 +29,7 @@ from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.backend.packed import Places
     from symdyn.given import ContactMode, Key, Named, Names, Numbers, PathName, Row, States, Times, Values
     from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
@@ -540,6 +541,16 @@ class Module:
                                 "derivatives is unknown; compile equations")
         found = self.structure(name)
         return found if found is not None else np.zeros(self.shape(name), dtype=bool)
+
+    def places_of_jacobian(self) -> Places | None:
+        """Where `jacobian_x` may differ from zero, as places of rows and columns; None where that is unknown, as where the module
+        was put together without equations.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").places_of_jacobian().columns
+        array([1, 0])
+        """
+        found: Places | None = getattr(self._provider, "places", None)
+        return found
 
     def breaks(self) -> Tape | None:
         """Surfaces at which the right-hand side has a kink or a jump, a tape with the output `surfaces`; None where it has

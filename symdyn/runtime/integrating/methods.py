@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 DEFAULT, SERIES = METHOD, "taylor"
 # What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
 SMALLEST_RTOL = 1e-15
+# Bytes of the matrices of an implicit method beyond which a factorization takes minutes.
+LARGEST_MATRICES = 2**29
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,29 @@ def _not_collocated(module: Module, request: Request) -> str:
     return _constrained(module, request) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
+def _dense(stages: int) -> Callable[[Module, Request], str]:
+    """Matrices of the compiled implicit methods have all entries: that of the derivative, and a real and an imaginary part for
+    each two stages."""
+
+    def unfit(module: Module, request: Request) -> str:
+        n = len(request.x0)
+        size = 8 * n**2 * (stages + 2)
+        if size <= LARGEST_MATRICES:
+            return ""
+        there = module.places_of_jacobian()
+        instead = ("'Radau' of SciPy, whose factors have few entries here" if there is not None and there.sparse else
+                   f"'{DEFAULT}'")
+        return f"its matrices of {n} states take {size / 2**30:.1f} GiB; use method={instead}"
+
+    return unfit
+
+
 COMPILED = {m.name: m for m in (
     CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
     CompiledMethod(SERIES, unfit=_not_expanded),
     # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
-    CompiledMethod("radau", ("jacobian_x",), kinked=0.01), CompiledMethod("radau5", ("jacobian_x",), kinked=0.01),
+    CompiledMethod("radau", ("jacobian_x",), _dense(5), kinked=0.01),
+    CompiledMethod("radau5", ("jacobian_x",), _dense(3), kinked=0.01),
 )}
 
 

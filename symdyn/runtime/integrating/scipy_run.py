@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn.backend.packed import NAME, Places
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import not_finite
@@ -72,6 +73,7 @@ class Field:
         self.failed: list[tuple[float, np.ndarray]] = []  # where
         self.cause: BaseException | None = None  # what a function of the user raised there
         self.misfit: ArgumentError | None = None  # what one of inputs returned that does not fit
+        self.sparse: SparseJacobian | None = None
 
     def given(self, t: float, x: np.ndarray) -> Any:
         """Inputs at a state of the mechanism."""
@@ -97,11 +99,13 @@ class Field:
         self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + which)
         self.cause = error.__cause__
 
-    def jacobian(self, t: float, x: np.ndarray) -> np.ndarray:
+    def jacobian(self, t: float, x: np.ndarray) -> Any:
         """Exact; the work, if it is integrated too, is one more row, and nothing depends on it."""
         n = self.request.n_state
         state = x[:n]
         inputs = self.given(t, state)
+        if self.sparse is not None:
+            return self.sparse(t, x, inputs)
         J = self.bound.jacobian_x(t, state, inputs)
         if len(x) == n:
             return J
@@ -109,6 +113,25 @@ class Field:
         bordered[:n, :n] = J
         bordered[n, :n] = self.module.evaluate("power_x", t, state, self.request.p, inputs)
         return bordered
+
+
+class SparseJacobian:
+    """The same as a matrix of SciPy's without the zeros, whose factors have few entries, too."""
+
+    def __init__(self, module: Module, request: Request, there: Places) -> None:
+        self.module, self.request, self.there = module, request, there
+        self.evaluator = module.unit(NAME).evaluator(NAME)
+        self.evaluator.set_params(request.p)
+
+    def __call__(self, t: float, x: np.ndarray, inputs: Any) -> Any:
+        from scipy.sparse import csc_matrix
+
+        n, there = self.request.n_state, self.there
+        values, rows, columns = self.evaluator.one(t, x[:n], inputs or None), there.rows, there.columns
+        if len(x) > n:
+            work = self.module.evaluate("power_x", t, x[:n], self.request.p, inputs)
+            values, rows, columns = np.r_[values, work], np.r_[rows, np.full(n, n)], np.r_[columns, np.arange(n)]
+        return csc_matrix((values, (rows, columns)), shape=(len(x), len(x)))
 
 
 class _Cut(NamedTuple):
@@ -162,6 +185,10 @@ class Run:
         exact = request.stabilization.way != "baumgarte" and "jacobian_x" in self.module.functions
         if issubclass(self.solver_class, (integrate.Radau, integrate.BDF, integrate.LSODA)) and exact:
             options["jac"] = self.field.jacobian
+        if issubclass(self.solver_class, (integrate.Radau, integrate.BDF)) and exact:
+            there = self.module.places_of_jacobian()
+            if there is not None and there.sparse:
+                self.field.sparse = SparseJacobian(self.module, request, there)
         return options
 
     def start(self) -> None:

@@ -1,0 +1,50 @@
+"""The derivative of x_dot by x where most of its entries are zero: the others one after the other, and where they stand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from symdyn.backend.packed import NAME, Places
+from symdyn.formulation.equations import Equations
+from symdyn.tape.differentiate import reverse
+from symdyn.tape.node import Node
+from symdyn.tape.tape import Output, Tape, reachable
+
+
+def places(equations: Equations) -> Places | None:
+    """Where x_dot depends on x, by the statements; None where a numeric algorithm solves for some of it, at some states."""
+    if equations.otherwise is not None:
+        return None
+    entries = equations.quantity("rhs").tolist()
+    bits = {node: 1 << k for k, node in enumerate(_leaves(equations)) if node is not None}
+    for node in reachable(entries):
+        if node.op == "call":
+            return None
+        bits.setdefault(node, 0)
+        for a in node.args:
+            if isinstance(a, Node):
+                bits[node] |= bits[a]
+    needs = [bits[e] if isinstance(e, Node) else 0 for e in entries]
+    found = [[k for k, bit in enumerate(reversed(bin(need)[2:])) if bit == "1"] for need in needs]
+    rows = np.repeat(np.arange(len(entries)), [len(row) for row in found])
+    return Places(len(entries), rows, np.array([k for row in found for k in row], dtype=int))
+
+
+def packed_tape(equations: Equations) -> Tape:
+    """The entries at these places, row by row; each row is differentiated by itself, since it needs few of the statements."""
+    there = places(equations)
+    assert there is not None
+    leaves, recorder, entries = _leaves(equations), equations.recorder, equations.quantity("rhs").tolist()
+    values: list[Any] = []
+    for k, entry in enumerate(entries):
+        values += reverse(recorder, entry, [leaves[c] for c in there.columns[there.rows == k]])
+    return Tape(recorder, {NAME: Output.of(NAME, np.array(values, dtype=object))})
+
+
+def _leaves(equations: Equations) -> list[Any]:
+    """Of every state the leaf that stands for it; None where nothing depends on it."""
+    symbols = equations.symbols
+    known = {node.args[1]: node for node in reachable(equations.quantity("rhs").tolist()) if node.op == "leaf"}
+    return [known.get(s.name) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]

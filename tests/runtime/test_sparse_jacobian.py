@@ -1,0 +1,120 @@
+"""Derivatives whose entries are mostly zero: the same as the dense ones, in SciPy's implicit methods, and cables at rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse import issparse
+
+import symdyn as sd
+from symdyn.cli import main
+from symdyn.errors import ArgumentError
+from symdyn.lab import stiff_cables
+from symdyn.lab.stiff_cables import at_rest, elastic_cable, elastic_catenary, frequencies, irvine
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating import methods, scipy_run
+
+needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+@pytest.fixture(scope="module")
+def cable() -> Any:
+    """The module of a cable of 30 links, 116 states."""
+    return elastic_cable(30).embedding().compile()
+
+
+def matrix(module: Any, x: np.ndarray) -> np.ndarray:
+    """The derivative from its entries."""
+    places = module.places_of_jacobian()
+    found = np.zeros((places.n, places.n))
+    found[places.rows, places.columns] = module.evaluate("jacobian_x_packed", 0.0, x)
+    return found
+
+
+def near_the_start(module: Any) -> np.ndarray:
+    x = np.array([module.metadata.initial.get(name, 0.0) for name in module.metadata.x])
+    return x + 1e-2 * np.random.default_rng(3).standard_normal(len(x)) / len(x)
+
+
+@pytest.mark.parametrize("make", [lambda: elastic_cable(30).embedding(), lambda: sd.systems.get("double_pendulum").embedding(),
+                                  lambda: sd.systems.get("spatial_chain", n=3).recursive()])
+def test_entries_are_those_of_the_whole_derivative(make: Any) -> None:
+    module = make().compile()
+    x = near_the_start(module)
+    whole = module.bind(None).jacobian_x(0.0, x)
+    assert np.abs(matrix(module, x) - whole).max() <= 1e-12 * np.abs(whole).max()
+    assert (module.sparsity() >= (whole != 0)).all()
+
+
+def test_entries_follow_differences(cable: Any) -> None:
+    x, h = near_the_start(cable), 1e-7
+    steps = h * np.eye(len(x))
+    differences = np.transpose([(cable.rhs(0.0, x + step) - cable.rhs(0.0, x - step)) / (2 * h) for step in steps])
+    found = matrix(cable, x)
+    assert np.abs(found - differences).max() <= 1e-6 * np.abs(found).max()
+
+
+def test_where_factors_are_sparse(cable: Any) -> None:
+    assert cable.places_of_jacobian().sparse
+    assert len(cable.places_of_jacobian().rows) <= 26 * 29  # 6 entries of each neighbour, 12 of its own, 2 rates
+    assert not sd.systems.get("double_pendulum").compile().places_of_jacobian().sparse
+    assert sd.systems.get("four_bar").compile().places_of_jacobian() is None
+
+
+@needs_c
+@pytest.mark.parametrize("method", ["Radau", "BDF"])
+@pytest.mark.parametrize("work", [False, True])
+def test_stiff_motion_is_that_of_dense_factors(cable: Any, method: str, work: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    call = scipy_run.SparseJacobian.__call__
+
+    def noted(self: Any, *given: Any) -> Any:
+        made.append(call(self, *given))
+        return made[-1]
+
+    monkeypatch.setattr(scipy_run.SparseJacobian, "__call__", noted)
+    exact = cable.simulate([0, 0.02], method="radau5", rtol=1e-9, atol=1e-9)
+    found = cable.simulate([0, 0.02], method=method, rtol=1e-7, atol=1e-9, work=work)
+    assert found.success and made and all(issparse(J) and J.shape[0] == 116 + work for J in made)
+    assert np.abs(found.q[-1] - exact.q[-1]).max() <= 1e-7
+    if work:
+        assert found.energy_error() <= 1e-5
+
+
+def test_dense_matrices_that_are_too_large_are_refused(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(methods, "LARGEST_MATRICES", 8 * 116**2 * 5 - 1)
+    if cable.backend == "c":
+        with pytest.raises(ArgumentError, match=r"its matrices of 116 states take 0\.0 GiB; use method='Radau' of SciPy, whose"):
+            cable.simulate((0, 0.1), method="radau5")
+    monkeypatch.setattr(methods, "LARGEST_MATRICES", 1)
+    if cable.backend == "c":
+        with pytest.raises(ArgumentError, match=r"4 states take .* use method='dop853'"):
+            sd.systems.get("double_pendulum").compile(backend="c").simulate((0, 0.1), method="radau")
+
+
+def test_sag_and_frequencies_converge_to_closed_forms() -> None:
+    """The elastic catenary, and Irvine's frequencies of cables with little sag, from twenty and forty links."""
+    H, sag = elastic_catenary(1e7, 4e3)
+    exact, sags, found = irvine(H, 1e7), [], []
+    for n in (20, 40):
+        q, slope = at_rest(elastic_cable(n, 1e7, 4e3).embedding().compile())
+        sags.append(-q[n - 1:].min())
+        found.append(frequencies(slope))
+    assert sags[1] / sag - 1 == pytest.approx((sags[0] / sag - 1) / 4, rel=0.02) and abs(sags[1] / sag - 1) < 1e-3
+    assert (4 * sags[1] - sags[0]) / (3 * sag) == pytest.approx(1, abs=1e-9)
+    # Those of a taut string of n links are known: 2 n sin(k pi / 2 n) in place of k pi.
+    links = 2 * 40 * np.sin(np.arange(2, 6) * np.pi / 80) * np.sqrt(H)
+    assert found[1][1::2] == pytest.approx(links[::2], rel=1e-6)
+    assert (4 * found[1] - found[0]) / 3 == pytest.approx(exact, rel=1e-4)
+
+
+@needs_c
+def test_measurement(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "stiff", "--sizes", "10", "--json", str(tmp_path / "found.json")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == stiff_cables.HEADING and [line.split()[4] for line in lines[1:3]] == ["Radau", "radau5"]
+    assert lines[3] == stiff_cables.REST_HEADING and (tmp_path / "found.json").exists()
+    with pytest.raises(ArgumentError, match=r"10 or more; found 3 20$"):
+        stiff_cables.run((3, 20))
