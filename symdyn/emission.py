@@ -33,7 +33,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
          batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
          adjoint: tuple[str, ...] | None = None, held: tuple[str, ...] = (),
          followed: tuple[str, ...] = (), open_contacts: bool = False, threads: bool = False,
-         rolled: Rolling = "auto") -> Source:
+         single: bool = False, rolled: Rolling = "auto") -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -45,7 +45,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     adjoint      what weights of x_dot are carried back to by further functions, see RightSide
     held, followed   inputs with derivatives along these further states, see RightSide
     open_contacts   leave out what closed rigid contacts do, see RightSide
-    threads      C only: the text of a kernel that integrates many motions by a thread each, see RightSide
+    threads      C only: the text of a kernel that integrates many motions by a thread each, see RightSide; single: with floats
     states       how many random states the reference vectors of a standalone source begin with
     rolled       C only: whether statements that a function repeats, as for like bodies, become loops: "auto" where these are many
                  and the templates are the shipped ones, True wherever some are, False nowhere
@@ -69,7 +69,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         columns = columns_of if backend == "c" and not standalone and not threads and templates is None else None
         right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts, threads)
         content = content_of(equations, names, standalone, bound, right_side, columns)
-        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads, rolled=rolled)
+        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads,
+                      single=single, rolled=rolled)
 
 
 def rolling(rolled: object) -> Rolling:

@@ -68,7 +68,8 @@ class Libraries:
             return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                         work=what.work, baumgarte=what.baumgarte, method=what.method,
                         sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held,
-                        followed=what.followed, open_contacts=what.open_contacts, threads=what.threads, rolled=self.rolled)
+                        followed=what.followed, open_contacts=what.open_contacts, threads=what.threads, batch=what.lanes,
+                        integrator=what.integrated, single=what.single, rolled=self.rolled)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                     batch=what == BATCH, rolled=self.rolled)

@@ -137,11 +137,12 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
     return result
 
 
-def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads: bool) -> dict[str, bool]:
+def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads: bool, single: bool = False) -> dict[str, bool]:
     """Macros by which parts are left out.
 
     gathered   what the method's template gets besides
     threads    whether there is a kernel that integrates many motions by a thread each
+    single     whether the text becomes one of single precision
     """
     tableau = method.tableau
     return {"SYMDYN_EXPLICIT": tableau is not None, "SYMDYN_RADAU": method.template == "radau",
@@ -157,4 +158,4 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads:
             "SYMDYN_HAS_INPUTS": shape.sizes["inputs"] > 0, "SYMDYN_EVENTS": bool(shape.events),
             "SYMDYN_HAS_RESETS": bool(shape.resets), "SYMDYN_KEEPS_RESETS": bool(shape.held),
             "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves),
-            "SYMDYN_THREADS": threads}
+            "SYMDYN_THREADS": threads, "SYMDYN_SINGLE": single}

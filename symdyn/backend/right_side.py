@@ -21,6 +21,10 @@ class RightSide:
     followed    inputs that follow the state by a function of the user, whose derivatives along the columns are further inputs
     open_contacts   whether all rigid contacts are open, whatever their parameters say: what they do is left out
     threads     whether it is a text for devices, with a kernel that integrates many motions by a thread each
+    lanes       whether many motions are integrated at once, too, a motion in each SIMD lane
+    looks       whether its integrator looks for events
+    single      whether it computes in single precision, of texts for devices
+    integrated  whether it has an integrator; of a text for devices: with a kernel that computes many right-hand sides if not
     adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
@@ -33,6 +37,10 @@ class RightSide:
     followed: tuple[str, ...] = ()
     open_contacts: bool = False
     threads: bool = False
+    lanes: bool = False
+    looks: bool = True
+    single: bool = False
+    integrated: bool = True
 
     @property
     def in_lanes(self) -> bool:
@@ -47,7 +55,9 @@ class RightSide:
                  (f"the method {self.method}", self.method != METHOD),
                  (f"sensitivities in {len(self.sensitivities)} columns", bool(self.sensitivities)),
                  ("the way back", self.adjoint is not None), ("all contacts open", self.open_contacts),
-                 ("a kernel of many motions", self.threads))
+                 ("a kernel of many motions" if self.integrated else "a kernel of many states", self.threads),
+                 ("many motions at once", self.lanes),
+                 ("single precision", self.single))
         added = " and ".join(text for text, there in parts if there)
         return f"rhs with {added}" if added else "rhs"
 

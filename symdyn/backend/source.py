@@ -29,6 +29,7 @@ from symdyn.backend.methods import Method, method_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
+from symdyn.backend.single import in_single
 from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
 from symdyn.backend.user_functions import texts as texts_of_user_functions
@@ -123,7 +124,8 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
            integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
-           only: Sequence[str] = (), threads: bool = False, rolled: Rolling = "auto") -> Source:
+           only: Sequence[str] = (), threads: bool = False, single: bool = False,
+           rolled: Rolling = "auto") -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -132,6 +134,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
     threads      C only: with the integrator of many trajectories by a thread each, which also compiles as CUDA C
+    single       of texts for devices: whether they compute in single precision
     rolled       whether what functions repeat becomes loops, see symdyn.backend.program.build; not in texts for devices
     states       how many random states the reference vectors begin with
     only         the templates of the files that are wanted, without reference vectors; none: all, or the first one where they are
@@ -166,7 +169,9 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
     context = _context(content, program, dialect, standalone, integrator, lanes, many, method, 0 if only else states)
-    context["threads"] = threads
+    context["threads"], context["single"] = threads, single
+    if single:
+        _check_single(content.name, program)
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
@@ -189,8 +194,17 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         if backend == "c":
             text = divided(text) if context["divided"] else whole(text)
+            text = in_single(text) if single else text
         files[target.format(name=context["name"])] = text
     return Source(backend, files, program, context["metadata_record"])
+
+
+def _check_single(name: str, program: Program) -> None:
+    """Raises UnsupportedExpression for algorithms, and functions of the user, whose texts are in double precision."""
+    faults = [f"{kernel} ({_CALLED_BY[kernel]})" for kernel in program.kernels] + [f.signature for f in program.user_functions]
+    if faults:
+        raise UnsupportedExpression(f"{name}: there is no single precision of {', '.join(faults)}, which its right-hand side "
+                                    "calls; pass precision='double'")
 
 
 def _environment(*folders: Path) -> jinja2.Environment:
@@ -215,7 +229,7 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
              and not context["threads"] and method.template != "taylor")
     called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
-    return {"runtime": Parts(read, switches(method, shape, gathered, context["threads"])),
+    return {"runtime": Parts(read, switches(method, shape, gathered, context["threads"], context["single"])),
             "runtime_sizes": runtime_sizes(method, shape, gathered),
             "integrated": called, "sensitive": shape.columns > 0, "resets": shape.resets, "held": shape.held,
             "divided": units, "linked": "SYMDYN_HIDDEN" if units else "SYMDYN_APART static" if context["threads"] else "static"}

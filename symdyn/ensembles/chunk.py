@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from symdyn.arguments import take
+from symdyn.backend.right_side import METHOD
 from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
-from symdyn.runtime.batches.motions import why_one_by_one
+from symdyn.runtime.batches.motions import IN_LANES, why_one_by_one
 from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.outcome import Outcome
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
@@ -175,9 +177,18 @@ def _raise_others(error: Exception) -> None:
         raise error
 
 
-def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any]) -> bool:
+def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any], measures: Sequence[Measure]) -> bool:
     """Whether motions can be integrated several at once, with the very steps of `simulate`."""
-    return not (why_one_by_one(module) or consistent) and set(options) <= {"rtol", "atol", "max_step", "first_step"}
+    return (not (why_one_by_one(module) or consistent) and events_serve(module, options, measures)
+            and options.get("method", METHOD) in IN_LANES
+            and set(options) <= {"rtol", "atol", "max_step", "first_step", "method", "events", "event_spacing"})
+
+
+def events_serve(module: Module, options: Mapping[str, Any], measures: Sequence[Measure]) -> bool:
+    """Whether outcomes need nothing of the events but what these do to the states at the output times."""
+    look = wanted(module, options.get("events", True))
+    stops = any(event.stop for event, sought in zip(module.metadata.events, look, strict=True) if sought)
+    return not look.any() or not (stops or any(m.name not in module.metadata.x for m in measures))
 
 
 def motion(setting: Setting, sample: np.ndarray) -> Solution:

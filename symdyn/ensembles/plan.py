@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.backend.right_side import METHOD, RightSide
-from symdyn.ensembles.chunk import Chunk, Setting, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.chunk import Chunk, Setting, events_serve, motion, quiet, setting_of, vectors_serve
 from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
 from symdyn.ensembles.portable import PortableModule, of_contacts
 from symdyn.ensembles.samples import Samples
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound
 from symdyn.kinds import flag
+from symdyn.runtime.batches.motions import unit_of
 from symdyn.runtime.batches.on_device import demand_fit
-from symdyn.runtime.batches.states import UNIT
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.integrating.events import wanted
@@ -131,9 +131,11 @@ def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: A
     times = output_times(t, measures, module)
     gpu = devices.device_number(device, module.name)
     if gpu is not None:
-        _check_device(module, gpu, options, consistent)
-    vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options))
-    together = [UNIT if gpu is None else RightSide(method=str(options.get("method", METHOD)), threads=True)] if vectors else []
+        _check_device(module, gpu, options, consistent, measures)
+    vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options, measures))
+    method, looks = str(options.get("method", METHOD)), bool(wanted(module, options.get("events", True)).any())
+    lanes = unit_of(method, looks) if gpu is None else RightSide(method=method, threads=True, looks=looks)
+    together = [lanes] if vectors else []
     portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions, *together])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
     if varies_over_time(inputs):
@@ -154,13 +156,17 @@ def whole(value: object, what: str, module: Module) -> int | None:
     return int(value)
 
 
-def _check_device(module: Module, number: int, options: Mapping[str, Any], consistent: bool) -> None:
+def _check_device(module: Module, number: int, options: Mapping[str, Any], consistent: bool,
+                  measures: Sequence[Measure]) -> None:
     """Raises ArgumentError for what a device does not take, and where it is not there; MissingExtra."""
     others = {name: value for name, value in options.items() if name not in ("events", "event_spacing")}
-    demand_fit(module, options.get("method", METHOD), None, others, bool(wanted(module, options.get("events", True)).any()))
+    demand_fit(module, options.get("method", METHOD), None, others)
     if consistent:
         raise ArgumentError(f"{module.name}: device='gpu' takes starts as they are; leave consistent out, or sample starts that "
                             "fulfil the constraints")
+    if not events_serve(module, options, measures):
+        raise ArgumentError(f"{module.name}: device='gpu' keeps states at output times and no times of events; take outcomes of "
+                            "states and events that do not stop the motion, pass events=False, or leave device out")
     devices.open_device(number, module.name).close()
 
 

@@ -49,16 +49,16 @@ def written(equations: Equations, functions: Sequence[str] | None, method: str |
 
 def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...]:
     """The functions in the library of a right-hand side and its integrator."""
+    if not right_side.integrated:
+        return ("rhs",)
     names = ["rhs", *(CORRECTIONS if equations.constraints else ())]
-    if right_side.threads:  # kernels look for no events
-        return tuple(names)
     if right_side == RightSide():  # evaluated in or after every simulation
         names += [n for n in ("watches", "switches") if has_function(equations, n)]
     if right_side.adjoint is not None:
         return (*names, *adjoints_of(equations))
     if right_side.sensitivities:
         names += functions_of(equations)
-    return (*names, *(n for n in _OF_EVENTS if has_function(equations, n)))
+    return (*names, *(n for n in _OF_EVENTS if right_side.looks and has_function(equations, n)))
 
 
 def with_function(equations: Equations, name: str) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, overload
 
 import numpy as np
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from symdyn.given import ContactMode, Key, Named, Names, Numbers, PathName, Row, States, Times, Values
     from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
+    from symdyn.runtime.gpu.dlpack import OnDevice
     from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.integrating.gradient import Gradient
     from symdyn.runtime.integrating.ode_solver import CompiledSolver
@@ -154,13 +155,28 @@ class Module:
                 return evaluator.one(float(t), x, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
 
+    @overload
     def rhs_batch(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
-                  out: np.ndarray | None = None) -> np.ndarray:
+                  out: np.ndarray | None = None, device: Literal["cpu"] = "cpu", precision: str = "double") -> np.ndarray: ...
+
+    @overload
+    def rhs_batch(self, t: Times | OnDevice, x: States | OnDevice, params: States | OnDevice | None = None,
+                  inputs: States | OnDevice | None = (), out: np.ndarray | OnDevice | None = None, device: str = "cpu",
+                  precision: str = "double") -> np.ndarray | OnDevice: ...
+
+    def rhs_batch(self, t: Times | OnDevice, x: States | OnDevice, params: States | OnDevice | None = None,
+                  inputs: States | OnDevice | None = (), out: np.ndarray | OnDevice | None = None, device: str = "cpu",
+                  precision: str = "double") -> np.ndarray | OnDevice:
         """x_dot (n, n_x) at rows of states x (n, n_x), with the C backend several at once on the processor's vectors.
 
         t                one time or (n,)
         params, inputs   as everywhere, or with an array (n,) for each name that varies, or (n, n_p), (n, n_in)
         out              where the result goes, else a new array
+        device           "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU (`simulate_batch`). Where x
+                         lies there, as an array of JAX, CuPy or PyTorch (any that has `__dlpack__`), it is read there, as
+                         are t, params and inputs; the result is `out`, written there, or a new array there, which these
+                         libraries take by `from_dlpack`. Nothing is copied but what is not there, and a code of each state
+        precision        of the device: "double", or "single": float32. Arrays there have numbers of this type
 
         Rows that cannot be evaluated are NaN, and an EvaluationWarning says which and why. Values have the same bits as
         those of `rhs`. Quickest with states entry by entry in memory (x = a.T of an array a (n_x, n)).
@@ -172,7 +188,8 @@ class Module:
         """
         from symdyn.runtime.batches.states import rhs_batch
 
-        return rhs_batch(self, t, x, params, inputs, out)
+        found: np.ndarray | OnDevice = rhs_batch(self, t, x, params, inputs, out, device, precision)
+        return found
 
     @property
     def batch_width(self) -> int:

@@ -19,6 +19,7 @@ class HostDevice:
     """
 
     name = "a processor"
+    where = (1, 0)
 
     def __init__(self, memory: int = 2**30, threads: int = 256) -> None:
         self.memory, self.threads = memory, threads
@@ -48,6 +49,9 @@ class HostDevice:
 
     def stream(self) -> list[Any]:
         return []
+
+    def handle(self, stream: list[Any]) -> None:
+        return None
 
     def upload(self, stream: list[Any], address: int, values: np.ndarray) -> None:
         self._inside(address, values.nbytes)

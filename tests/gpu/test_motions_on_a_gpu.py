@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from host_device import HostDevice
 
 import symdyn as sd
@@ -22,11 +23,11 @@ from symdyn.backend.right_side import RightSide
 from symdyn.cli import main
 from symdyn.ensembles.sweep_file import read_sweep
 from symdyn.errors import ArgumentError, CompileError, MissingExtra, SimulationInterrupted, SimulationWarning
-from symdyn.runtime.batches import on_device
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.gpu import compiling, device
 from symdyn.runtime.gpu.motions import Motions
+from tests.runtime.constrained import module as constrained
 
 HERE = Path(__file__).parent
 
@@ -115,6 +116,60 @@ def test_other_pairs_and_inputs_by_tables(host: HostDevice) -> None:
     by_bs54 = module.simulate_batch(**asked, method="bs54", device="gpu")
     same(by_bs54, module.simulate_batch(**asked, method="bs54"))
     assert not np.array_equal(by_bs54.n_steps, there.n_steps)
+
+
+@functools.cache
+def ball(stops: bool) -> Any:
+    """A ball that loses a part of its speed at the floor, and may stop the motion where it comes up to 1.5 m."""
+    y: Any = sd.coordinates("y")
+    m, e = sd.parameters("m e")
+    system = sd.System("ball", gravity=[0, -10, 0])
+    system.add_joint(sd.Prismatic("j", system.ground, system.add_body("b", mass=m), y, axis=[0, 1, 0]))
+    system.add_event("floor", y, direction=-1, reset={y.dot: -e * y.dot})
+    if stops:
+        system.add_event("top", y - 1.5, direction=1, stop=True)
+    system.defaults = {m: 1, e: 0.8}
+    return system.embedding().compile(backend="c")
+
+
+@pytest.mark.parametrize("t", [(0, 2), [0, 0.5, 0.7, 2]])
+def test_events_with_resets_and_stops(host: HostDevice, t: Any) -> None:
+    starts: dict[str, Any] = {"q": {"y": np.linspace(0.2, 1.4, 23)}, "u": {"y_dot": np.linspace(-6, 3, 23)}, "t": t}
+    there, here = ball(True).simulate_batch(**starts, device="gpu"), ball(True).simulate_batch(**starts)
+    same(there, here)
+    assert here.success.all() and host.log and "8 at once" in there.note
+    high = ball(False).simulate_batch(**starts)
+    assert not np.array_equal(high.x, here.x, equal_nan=True)
+    same(ball(False).simulate_batch(**starts, device="gpu"), high)
+
+
+def test_motions_with_doubtful_events_go_on_on_the_processor(host: HostDevice) -> None:
+    x: Any = sd.coordinates("x")
+    system = sd.System("thrown")
+    system.add_joint(sd.Prismatic("j", system.ground, system.add_body("b", mass=1), x, axis=[1, 0, 0]))
+    system.add_event("blur", sp.sin(100000 * sd.t * x) + sp.cos(100000 * sd.t * x) + sp.Rational(1414215, 1000000))
+    module = system.embedding().compile(backend="c")
+    with pytest.warns(SimulationWarning, match="of 3 motions 1: thrown: zeros of events may be missed: blur"):
+        there = module.simulate_batch({"x": [0.0, 1.0, 0.0]}, t=(0, 10), device="gpu")
+    assert there.success.all() and there.note.startswith("1 of 3 motions one by one: quantities of their events vary too quickly")
+
+
+@pytest.mark.parametrize("method", ["radau", "radau5", "gauss", "taylor"])
+def test_implicit_methods_and_series(host: HostDevice, method: str) -> None:
+    module, asked = compiled("double_pendulum"), swings(20)
+    there = module.simulate_batch(**asked, t=[0, 0.2, 0.5], method=method, device="gpu")
+    same(there, module.simulate_batch(**asked, t=[0, 0.2, 0.5], method=method))
+    plain = module.simulate_batch(**asked, t=[0, 0.2, 0.5])
+    assert host.log and not np.array_equal(there.x, plain.x) and np.abs(there.x - plain.x).max() < 1e-6
+
+
+def test_what_has_no_series_goes_on_on_the_processor(host: HostDevice) -> None:
+    """Turning points of a loop, where dependent speeds do not follow."""
+    module = constrained("bricard")
+    asked: dict[str, Any] = {"t": np.linspace(0, 10, 5), "method": "taylor", "rtol": 1e-12}
+    there = module.simulate_batch(**asked, device="gpu")
+    same(there, module.simulate_batch(**asked))
+    assert there.note.startswith("1 of 1 motions one by one: there is no Taylor series of some of their states")
 
 
 def test_what_fails_is_reported_and_the_others_run_on(host: HostDevice) -> None:
@@ -225,9 +280,9 @@ def test_no_gpu() -> None:
 
 def test_all_that_a_kernel_does_not_do_is_said_at_once(host: HostDevice) -> None:
     module = compiled("double_pendulum")
-    with pytest.raises(ArgumentError, match=r"does not take these motions: method='radau'; kernels integrate by 'dop853' or "
-                                            r"'bs54'; max_steps, sensitivities: kernels have none of these\. Leave device out"):
-        module.simulate_batch(t=(0, 1), device="gpu", method="radau", max_steps=10, sensitivities=["m2"])
+    with pytest.raises(ArgumentError, match=r"does not take these motions: method='RK45'; kernels integrate by 'dop853' or "
+                                            r"'bs54' or .*; max_steps, sensitivities: kernels have none of these\. Leave device"):
+        module.simulate_batch(t=(0, 1), device="gpu", method="RK45", max_steps=10, sensitivities=["m2"])
     with pytest.raises(ArgumentError, match="inputs by functions of Python or controllers; give tables, splines or numbers"):
         driven = compiled("cart_pole")
         driven.simulate_batch(t=(0, 1), inputs={driven.metadata.inputs[0]: lambda t, x: 0.0}, device="gpu")
@@ -235,7 +290,12 @@ def test_all_that_a_kernel_does_not_do_is_said_at_once(host: HostDevice) -> None
         sd.systems.pendulum().compile(backend="numpy").simulate_batch(t=(0, 1), device="gpu")
     with pytest.raises(ArgumentError, match="takes starts as they are; leave consistent out"):
         sd.ensemble(module, {"q1": [0.1]}, (0, 1), device="gpu", consistent=True)
-    assert on_device.METHODS == ("dop853", "bs54")
+    with pytest.raises(ArgumentError, match=r"method='gauss': .*corrections back onto constraints"):
+        compiled("four_bar").simulate_batch(t=(0, 1), device="gpu", method="gauss")
+    with pytest.raises(ArgumentError, match="keeps states at output times and no times of events; take outcomes of states"):
+        sd.ensemble(ball(True), {"y": [1.0]}, (0, 1), ["end y"], device="gpu")
+    with pytest.raises(ArgumentError, match="keeps states at output times and no times of events"):
+        sd.ensemble(ball(False), {"y": [1.0]}, (0, 1), {"bounces": lambda sol: len(sol.events["floor"].t)}, device="gpu")
 
 
 def test_a_sweep_from_the_command_line(host: HostDevice, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -257,12 +317,17 @@ def test_missing_packages(monkeypatch: pytest.MonkeyPatch) -> None:
 # -- as code of a GPU
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "four_bar", "floating_crane"])
-def test_kernels_compile_for_a_gpu(name: str) -> None:
+@pytest.mark.parametrize(("name", "method"), [("double_pendulum", "dop853"), ("double_pendulum", "bs54"),
+    ("double_pendulum", "radau"), ("double_pendulum", "gauss"), ("double_pendulum", "taylor"), ("four_bar", "dop853"),
+    ("four_bar", "radau5"), ("floating_crane", "dop853"), ("ball", "dop853"), ("ball", "radau")])
+def test_kernels_compile_for_a_gpu(name: str, method: str) -> None:
+    """Without a warning."""
     pytest.importorskip("cuda.bindings")
-    unit: Any = compiled(name).unit(RightSide(threads=True))
-    code = compiling.ptx(unit.source, name, "compute_90").decode()
-    assert f".entry {unit.metadata.name}_motions(" in code and "fma.rn.f64" in code
+    module = ball(True) if name == "ball" else compiled(name)
+    unit: Any = module.unit(RightSide(method=method, threads=True))
+    code, printed = compiling.ptx(unit.source, name, "compute_90")
+    assert f".entry {unit.metadata.name}_motions(".encode() in code and b"fma.rn.f64" in code and not printed
+    assert ("symdyn_search_step" in unit.source) == (name == "ball")
 
 
 def test_the_stack_of_a_kernel_is_bounded() -> None:

@@ -151,6 +151,14 @@ def test_a_narrow_pulse_of_a_reaction_is_warned_of_or_found_with_a_spacing(backe
     np.testing.assert_allclose(spaced.events["pull"].t.reshape(-1, 2).mean(axis=1), level.events["pull"].t, atol=1e-4)
 
 
+def test_many_motions_warn_of_a_narrow_pulse_of_a_reaction() -> None:
+    module = hinged(lambda N: sp.exp(-((N - 2) / 0.001) ** 2) - sp.Rational(1, 2), "c")
+    match = "of 2 motions 0: pendulum: zeros of events may be missed: pull depends on exp of what is only sampled, .*; 1: pend"
+    with pytest.warns(SimulationWarning, match=match):
+        many = module.simulate_batch({"q1": [1, 1.1]}, t=(0, 1))
+    assert many.success.all()
+
+
 def test_a_pulse_in_a_long_value_is_warned_of() -> None:
     """A sum of two hundred sines, which bounds say little of."""
     s = particle(lambda y: sp.exp(-sum(sp.sin(k * y + k) for k in range(1, 201)) ** 2) - sp.Rational(1, 2))

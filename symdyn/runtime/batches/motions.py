@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes
 import time as clock
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.methods import METHODS
+from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows, together
 from symdyn.runtime.batches.on_device import on_device
@@ -21,9 +22,10 @@ from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tabl
 from symdyn.runtime.batches.together import LISTED, Asked, Together, warn
 from symdyn.runtime.batches.validity import outside
 from symdyn.runtime.gpu.device import device_number
-from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
+from symdyn.runtime.inputs.inputs import Inputs, demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
+from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.integrating.simulate import (
@@ -42,8 +44,8 @@ if TYPE_CHECKING:
 PIECE = 5_000
 # Where the right-hand side jumps: so many calls in which no motion ends before those under way are looked at for chattering.
 PATIENCE = 4
-# The method of motions that are integrated at once.
-METHOD = "dop853"
+# The methods of motions that are integrated at once: those that are explicit.
+IN_LANES = tuple(name for name, method in METHODS.items() if method.tableau is not None)
 NO_VECTORS = "the C compiler has no vectors"
 
 
@@ -63,7 +65,6 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     by = tuple(names_of(module, sensitivities, faults)) if sensitivities is not None else ()
     if faults:
         raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
-    has_events = bool(wanted(module, events).any())
     initial = metadata.initial
     groups = [take_rows(values, metadata.names(what), f"initial {what}", metadata.initial_values(what), module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
@@ -84,23 +85,26 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
-                   checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
-    note = why_one_by_one(module, has_events) or _why_these(by_time, options) or ("one by one: with sensitivities" if by else "")
+                   checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"), along,
+                   wanted(module, events), checked_spacing(module, event_spacing, span))
+    note = why_one_by_one(module) or _why_these(along, options) or ("one by one: with sensitivities" if by else "")
     if by:
         options |= {"sensitivities": by, "sensitivity_control": sensitivity_control}
     over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
     varying = inputs if by_time else None
     given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
-    if gpu is not None:
-        alone = {name: value for name, value in options.items() if name == "method"} | over_time
-        solution = on_device(module, asked, gpu, along, options, has_events,
-                             lambda which: _alone(module, asked, which, varying, alone))
+    rest = over_time | {"events": events, "event_spacing": asked.event_spacing}
+    if note and gpu is None:
+        solution = _one_by_one(module, asked, varying, given, note, options | rest)
+    else:
+        def alone(which: np.ndarray) -> BatchSolution:
+            return _alone(module, asked, which, varying, {k: v for k, v in options.items() if k == "method"} | rest)
+
+        method_or_default = options.get("method", METHOD)
+        solution = _on_vectors(module, asked, method_or_default, alone) if gpu is None else on_device(
+            module, asked, gpu, options, alone)
         if along is not None and along.pieces is not None and given.ndim == 3:
             given[:] = along.pieces.at(times)
-        return _warned(module, asked, solution, given)
-    options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
-    options |= over_time
-    solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
     return _warned(module, asked, solution, given)
 
 
@@ -123,15 +127,13 @@ def _times(module: Module, t: Any) -> tuple[np.ndarray, tuple[float, float]]:
     return (np.array([span[1]]) if pair else times), span
 
 
-def why_one_by_one(module: Module, events: bool = True) -> str:
-    """Why motions of a module are not integrated several at once; "" if they are. events: whether they are looked for."""
+def why_one_by_one(module: Module) -> str:
+    """Why motions of a module are not integrated several at once; "" if they are."""
     metadata = module.metadata
     if module.backend != "c":
         return f"one by one: the backend is {module.backend}"
     if metadata.contacts:
         return "one by one: the mechanism has rigid contacts"
-    if events and wanted(module, events).any():
-        return "one by one: the mechanism has events"
     return "" if metadata.sizes.x else "one by one: the mechanism has no state"
 
 
@@ -145,17 +147,23 @@ def many_at_once(module: Module, built: bool) -> str:
     return f"rhs_batch {lanes}, simulate_batch {why_one_by_one(module) or 'likewise'}"
 
 
-def _why_these(by_time: bool, options: Mapping[str, Any]) -> str:
-    if by_time:
-        return "one by one: inputs vary over time"
-    return f"one by one: asked for with {', '.join(options)}" if options else ""
+def _why_these(along: Inputs | None, options: Mapping[str, Any]) -> str:
+    if along is not None and not along.by_tables:
+        return "one by one: inputs by functions of Python or controllers"
+    others = [name for name in options if name != "method" or options[name] not in IN_LANES]
+    return f"one by one: asked for with {', '.join(others)}" if others else ""
 
 
 # -- on vectors
 
 
-def _on_vectors(module: Module, asked: Asked) -> BatchSolution:
-    unit: Any = module.unit(UNIT)
+def unit_of(method: str, looks: bool) -> str | RightSide:
+    """What the code of motions in lanes is made for; looks: for events."""
+    return UNIT if method == METHOD and not looks else RightSide(method=method, lanes=True, looks=looks)
+
+
+def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
+    unit: Any = module.unit(unit_of(method, asked.looks))
     together = Together(module, asked)
     n = asked.n
     size = unit.function("batch_size")
@@ -164,36 +172,47 @@ def _on_vectors(module: Module, asked: Asked) -> BatchSolution:
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
     real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, asked.atol, asked.times)])
     out = (ctypes.c_void_p * 2)(together.x.ctypes.data, together.states.ctypes.data)
+    pieces, stops = together.pieces, together.stops
+    problem = Problem(n_stops=len(stops), stops=stops.ctypes.data)
+    if pieces is not None:
+        breaks, coefficients = (np.ascontiguousarray(a) for a in (pieces.breaks, pieces.coefficients))
+        problem.n_pieces, problem.breaks, problem.pieces = len(coefficients), breaks.ctypes.data, coefficients.ctypes.data
     tables = tables_of([together.starts, asked.inputs, together.params, together.lengths])
     go = unit.function("batch_go")
     go.restype = ctypes.c_long
     interrupted, done, waited = False, 0, 0
-    doubtful = bool(module.metadata.switches) or projects(module)
+    doubtful = bool(module.metadata.switches) or projects(module) or asked.looks
     try:
+        if module.metadata.inputs:
+            unit.function("batch_inputs")(batch, ctypes.byref(problem))
+        if asked.looks:
+            unit.function("batch_look")(batch, ctypes.c_void_p(together.look.ctypes.data), ctypes.c_double(asked.event_spacing),
+                                        ctypes.c_long(together.taken_after), ctypes.c_void_p(together.doubts.ctypes.data))
         unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
                                      ctypes.c_void_p(together.reports.ctypes.data))
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (doubtful and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
-    return together.solution(unit, width(module), "" if width(module) > 1 else NO_VECTORS, interrupted, PATIENCE * PIECE,
-                             lambda which: _alone(module, asked, which))
+    return together.solution(unit, width(module), "" if width(module) > 1 else NO_VECTORS, interrupted, PATIENCE * PIECE, alone)
 
 
-def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any = None,
-           options: Mapping[str, Any] = MappingProxyType({})) -> BatchSolution:
+def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any, options: Mapping[str, Any]) -> BatchSolution:
     """Some motions one by one: a run of its own finds out whether a motion chatters and what led it off its constraints."""
     part = replace(asked, n=len(which), **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
                                            for name in ("starts", "params", "inputs")})
-    return _one_by_one(module, part, inputs, part.inputs, "", {"events": False, **options})
+    return _one_by_one(module, part, inputs, part.inputs, "", options, which, asked.n)
 
 
 # -- one by one
 
 
-def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, note: str,
-                options: Mapping[str, Any]) -> BatchSolution:
-    """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary."""
+def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, note: str, options: Mapping[str, Any],
+                which: np.ndarray | None = None, of: int = 0) -> BatchSolution:
+    """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary.
+
+    which, of   where these are some of more motions: their numbers there, how many there are
+    """
     n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
     x = np.full((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
@@ -228,7 +247,7 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
             messages[k] = str(error)
             continue
         success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
-        doubts += [f"{k}: {doubt}" for doubt in done.doubts]
+        doubts += [f"{k if which is None else which[k]}: {doubt}" for doubt in done.doubts]
         if len(asked.times) > 1:
             there = dict(zip(done.t.tolist(), done.x, strict=True))
             x[k] = [there.get(t, nowhere) for t in times.tolist()]
@@ -244,5 +263,5 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
             used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
         if not done.success:
             messages[k] = done.message
-    warn(doubts, n)
+    warn(doubts, of or n)
     return solution()

@@ -7,41 +7,41 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import ArgumentError
 from symdyn.runtime.batches.solution import BatchSolution
 from symdyn.runtime.batches.starts import projects
+from symdyn.runtime.batches.states_on_device import device_kernel
 from symdyn.runtime.batches.together import Asked, Together
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.gpu.motions import MOST_STEPS, Work, integrate
 from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.methods import unfit
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# The methods of kernels.
-METHODS = ("dop853", "bs54")
 
 
-def on_device(module: Module, asked: Asked, number: int, along: Inputs | None, options: Mapping[str, Any], has_events: bool,
+def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, Any],
               alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
     """Motions on the GPU with this number.
 
-    along      inputs over time
     options    of `simulate`, those that differ from the defaults
     alone      integrates some of the motions, by their numbers, on the processor
     Raises ArgumentError for what kernels cannot do, and where there is no such device; MissingExtra.
     """
     method = options.get("method", METHOD)
-    demand_fit(module, method, along, options, has_events)
+    demand_fit(module, method, asked.along, options)
     device = devices.open_device(number, module.name)
     try:
-        unit: Any = module.unit(RightSide(method=method, threads=True))
-        kernel = device.kernel(unit.source, module.name, f"{unit.metadata.name}_motions")
+        unit: Any = module.unit(RightSide(method=method, threads=True, looks=asked.looks))
+        kernel = device_kernel(module, device, unit.source, f"{unit.metadata.name}_motions")
         motions = Together(module, asked)
-        pieces, stops = (None, np.zeros(0)) if along is None else (along.pieces, np.sort(along.stops(asked.span)))
         work = Work(motions.starts, asked.inputs, motions.params, motions.lengths, motions.span, asked.atol, asked.times,
-                    projects(module), pieces, stops, motions.x, motions.states, motions.reports)
+                    projects(module), motions.pieces, motions.stops, motions.look, asked.event_spacing, motions.taken_after,
+                    motions.x, motions.states, motions.reports, motions.doubts)
         interrupted, note = False, ""
         try:
             note = integrate(device, kernel, work, module.name)
@@ -52,23 +52,23 @@ def on_device(module: Module, asked: Asked, number: int, along: Inputs | None, o
         device.close()
 
 
-def demand_fit(module: Module, method: Any, along: Inputs | None, options: Mapping[str, Any], has_events: bool) -> None:
+def demand_fit(module: Module, method: Any, along: Inputs | None, options: Mapping[str, Any]) -> None:
     """Raises ArgumentError with all that keeps motions from being integrated by a kernel; the arguments as above."""
     faults = []
     if module.backend != "c":
         faults.append(f"the backend of the module is {module.backend}; kernels are made of its C, compile(backend='c')")
     if module.metadata.contacts:
         faults.append("the mechanism has rigid contacts, whose modes change in Python")
-    if has_events:
-        faults.append("events are looked for; pass events=False where their times do not matter")
     if not module.metadata.sizes.x:
         faults.append("the mechanism has no state")
     if method not in METHODS:
         faults.append(f"method={method!r}; kernels integrate by {' or '.join(map(repr, METHODS))}")
+    elif module.backend == "c" and (why := unfit(module, method, along)):
+        faults.append(f"method={method!r}: {why}")
     others = [name for name in ("max_steps", "stabilization", "sensitivities") if name in options]
     if others:
         faults.append(f"{', '.join(others)}: kernels have none of these")
-    if along is not None and (along.function is not None or along.samplers):
+    if along is not None and not along.by_tables:
         faults.append("inputs by functions of Python or controllers; give tables, splines or numbers")
     if faults:
         raise ArgumentError(f"{module.name}: device='gpu' does not take these motions: {'; '.join(faults)}. Leave device out to "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from symdyn.backend.c_records import fields_of
 from symdyn.errors import ArgumentError, EvaluationWarning
 from symdyn.real_numbers import real_of
 from symdyn.runtime.batches.arguments import take_rows, together
+from symdyn.runtime.batches.precision import checked_precision
+from symdyn.runtime.gpu.device import device_number
 from symdyn.runtime.memory import demand
 from symdyn.shown import shown
 
@@ -58,8 +61,32 @@ def input_rows(module: Module, inputs: Any, defaults: Mapping[str, float]) -> np
     return take_rows(given, names, "inputs", {n: defaults.get(n, 0.0) for n in names}, module.name)
 
 
-def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
+def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = (), out: Any = None, device: Any = "cpu",
+              precision: Any = "double") -> Any:
     """x_dot (n, n_x); see Module.rhs_batch."""
+    number = device_number(device, module.name)
+    precision = checked_precision(precision, number is not None, module.name)
+    values = {"t": t, "x": x, "params": params, "inputs": inputs}
+    if number is not None:
+        from symdyn.runtime.batches.states_on_device import states_on_device
+
+        xd, reasons, n, states = states_on_device(module, number, values, out, precision, partial(_rows, module),
+                                               lambda x, n: _result(module, x, (n, module.metadata.sizes.x), out))
+        _warn_of(module, reasons, n, states)
+        return xd
+    n, arrays = _rows(module, values)
+    states, n_x = arrays["x"], module.metadata.sizes.x
+    demand(n * n_x * (1 if module.backend == "c" else 3), module.name, f"{n} rows of {n_x} numbers", "pass fewer rows at a time")
+    xd = _result(module, states, (n, n_x), out)
+    if out is not None:  # what is read must not be written before
+        arrays = {what: a.copy() if np.may_share_memory(a, out) else a for what, a in arrays.items()}
+    _warn_of(module, (_on_vectors if module.backend == "c" else _broadcast)(module, n, arrays, xd), n, states)
+    return xd
+
+
+def _rows(module: Module, values: Mapping[str, Any]) -> tuple[int, dict[str, np.ndarray]]:
+    """How many states there are, and the rows of t, x, inputs and params."""
+    t, x = values["t"], values["x"]
     states, times = _numbers(module, x, "x"), _numbers(module, t, "t")
     n_x = module.metadata.sizes.x
     if states.ndim == 1:
@@ -69,21 +96,19 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
                             f"{', '.join(module.metadata.x)}")
     if times.ndim > 1:
         raise ArgumentError(f"{module.name}: t has the shape {times.shape}; give one time, or one for each state")
-    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, module.metadata.initial),
-              "params": parameter_rows(module, params)}
-    n = together(arrays, module.name)
-    demand(n * n_x * (1 if module.backend == "c" else 3), module.name, f"{n} rows of {n_x} numbers", "pass fewer rows at a time")
-    xd = _result(module, states, (n, n_x), out)
-    if out is not None:  # what is read must not be written before
-        arrays = {what: a.copy() if np.may_share_memory(a, out) else a for what, a in arrays.items()}
-    reasons = (_on_vectors if module.backend == "c" else _broadcast)(module, n, arrays, xd)
+    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, values["inputs"], module.metadata.initial),
+              "params": parameter_rows(module, values["params"])}
+    return together(arrays, module.name), arrays
+
+
+def _warn_of(module: Module, reasons: Mapping[int, str], n: int, states: np.ndarray) -> None:
+    """Warns of rows that fail; states: none where they are on a device."""
     if reasons:
-        rows = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)])}"
+        rows = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)]) if len(states) else ''}"
                 for k, why in list(reasons.items())[:LISTED]]
         more = f"; and {len(reasons) - LISTED} more" if len(reasons) > LISTED else ""
         warnings.warn(f"{module.name}: rhs cannot be evaluated in {len(reasons)} of {n} rows, which are NaN: "
-                      f"{'; '.join(rows)}{more}", EvaluationWarning, stacklevel=3)
-    return xd
+                      f"{'; '.join(rows)}{more}", EvaluationWarning, stacklevel=4)
 
 
 def _result(module: Module, states: np.ndarray, shape: tuple[int, int], out: np.ndarray | None) -> np.ndarray:

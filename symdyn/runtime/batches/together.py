@@ -10,23 +10,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.c_records import codes_of
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.batches.solution import BatchSolution
 from symdyn.runtime.batches.starts import consistent_starts, projects
-from symdyn.runtime.integrating.compiled import FAR, moved_far
+from symdyn.runtime.integrating.chatter import STEPS
+from symdyn.runtime.integrating.compiled import FAR, PIECE, moved_far
+from symdyn.runtime.integrating.events import not_seen
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.masses import negative_masses
 
 if TYPE_CHECKING:
+    from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.module import Module
 
 LISTED = 3
+UNRESOLVED, UNPROVED = (codes_of("runtime/dropped_events.h")[what] for what in ("UNRESOLVED", "UNPROVED"))
 
 
 @dataclass(frozen=True)
 class Asked:
-    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies."""
+    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies.
+
+    along          inputs over time, the same for all; None: there are none
+    look           which events are looked for, (n_e,) of bool; event_spacing: of samples of them, s
+    """
 
     n: int
     starts: np.ndarray
@@ -38,12 +47,20 @@ class Asked:
     atol: np.ndarray
     max_step: float
     first_step: float
+    along: Inputs | None
+    look: np.ndarray
+    event_spacing: float
+
+    @property
+    def looks(self) -> bool:
+        """Whether any event is looked for."""
+        return bool(self.look.any())
 
 
 class Together:
     """Motions that are integrated together by compiled code, with its results.
 
-    x (n, n_t, n_x), reports (n,), states (n, 2, n_x)    what the code writes
+    x (n, n_t, n_x), reports (n,), states (n, 2, n_x), doubts (n,)    what the code writes
     starts, params, lengths   what it reads; not a number where a motion cannot begin, for which `wrong` has the reason
     """
 
@@ -54,12 +71,22 @@ class Together:
         self.reports = np.zeros(n, dtype=np.dtype(RunReport))
         self.reports["status"] = STATUS.STEP_LIMIT
         self.states = np.full((n, 2, n_x), np.nan)
+        self.doubts = np.zeros(n, dtype=np.intc)
+        along = asked.along
+        self.pieces = None if along is None else along.pieces
+        self.stops = np.zeros(0) if along is None else np.sort(along.stops(asked.span))
+        self.look = np.ascontiguousarray(asked.look if asked.looks else np.zeros(0), dtype=np.intc)
         self.span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
         self.params, self.wrong = _real(module, asked)
-        self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params,
-                                                              asked.inputs, n)
+        first = asked.inputs if self.pieces is None else self.pieces.at(np.array(asked.span[:1]))
+        self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params, first, n)
         self.wrong |= astray
         self.begun = clock.perf_counter()
+
+    @property
+    def taken_after(self) -> int:
+        """Attempted steps after which a run of its own takes its events."""
+        return STEPS if self.module.metadata.switches else PIECE
 
     def solution(self, unit: Any, width: int, note: str, interrupted: bool, limit: int,
                  alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
@@ -68,17 +95,29 @@ class Together:
         Raises SimulationInterrupted where that was interrupted.
         """
         module, reports, x, n = self.module, self.reports, self.x, self.asked.n
-        success, counts, late = reports["status"] == STATUS.DONE, _counts(reports), reports["status"] == STATUS.STEP_LIMIT
+        success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
+        late = reports["status"] == STATUS.STEP_LIMIT
         messages = {k: self.wrong.get(k) or _message(unit, reports[k], self.states[k]) for k in np.flatnonzero(~success).tolist()}
         if late.any() and not interrupted:
             why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
                    "their steps may have become too short")
             note = f"{late.sum()} of {n} motions one by one: they took more than {limit} steps, and {why}"
-        moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
-        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
-        if projects(module):  # what keeps a state from the constraints, a run of its own finds out
+        without_series = reports["status"] == STATUS.NO_SERIES
+        if without_series.any() and not interrupted:
+            note = f"{without_series.sum()} of {n} motions one by one: there is no Taylor series of some of their states"
+        late |= without_series
+        doubtful = self.doubts & (UNRESOLVED if self.asked.event_spacing else UNRESOLVED | UNPROVED) != 0
+        if doubtful.any() and not interrupted:
+            note = f"{doubtful.sum()} of {n} motions one by one: quantities of their events vary too quickly to be resolved"
+        late |= doubtful
+        # What keeps a state from the constraints, or fails at an event, a run of its own finds out.
+        if projects(module) or self.asked.looks:
             late |= ~success
             late[list(self.wrong)] = False
+        unseen = not_seen(module, self.asked.look, (), self.asked.event_spacing)
+        warn([f"{k}: {unseen}" for k in np.flatnonzero(~late).tolist() if unseen], n)
+        moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
+        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
         if late.any() and not interrupted:
             again = np.flatnonzero(late)
             single = alone(again)

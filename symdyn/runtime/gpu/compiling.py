@@ -13,7 +13,7 @@ from symdyn.shown import shown
 
 INSTALL = "pip install 'symdyn[gpu]'"
 # The text is C; designators are C++ since 2020. Functions that are not marked are those of the device.
-OPTIONS = ("-default-device", "-std=c++20", "-w")
+OPTIONS = ("-default-device", "-std=c++20")
 OUTPUT_LINES = 40
 
 
@@ -28,9 +28,12 @@ def nvrtc() -> Any:
     return functions
 
 
-def ptx(text: str, name: str, architecture: str) -> bytes:
-    """A kernel's text in CUDA C as PTX for an architecture such as "compute_90". Raises CompileError, MissingExtra."""
-    return _compiled(text, name, architecture, "PTX")[0]
+def ptx(text: str, name: str, architecture: str) -> tuple[bytes, str]:
+    """A kernel's text in CUDA C as PTX for an architecture such as "compute_90", and the compiler's warnings.
+
+    Raises CompileError, MissingExtra.
+    """
+    return _compiled(text, name, architecture, "PTX")
 
 
 def report(text: str, name: str, architecture: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
 from symdyn.runtime.gpu.compiling import INSTALL, cubin
+from symdyn.runtime.gpu.dlpack import CUDA
 from symdyn.shown import shown
 
 # Threads of a block: four warps.
@@ -19,6 +20,8 @@ class Device(Protocol):
     """What runs kernels. Addresses are numbers; copies and kernels of one stream follow each other, those of two do not wait."""
 
     name: str
+    # As DLPack has them: its type and number.
+    where: tuple[int, int]
 
     def free(self) -> int:
         """Bytes of memory that can be taken."""
@@ -37,6 +40,9 @@ class Device(Protocol):
 
     def stream(self) -> Any:
         """A stream of its own."""
+
+    def handle(self, stream: Any) -> int | None:
+        """A stream as DLPack has it."""
 
     def upload(self, stream: Any, address: int, values: np.ndarray) -> None:
         """Copy an array to the device."""
@@ -79,6 +85,7 @@ class Cuda:
         self.name = self._call("cuDeviceGetName", 256, self._device).split(b"\0")[0].decode()
         self.major, self.minor = self._attribute("COMPUTE_CAPABILITY_MAJOR"), self._attribute("COMPUTE_CAPABILITY_MINOR")
         self.multiprocessors = self._attribute("MULTIPROCESSOR_COUNT")
+        self.where = CUDA, number
         self._modules: list[Any] = []
         self._streams: list[Any] = []
 
@@ -99,11 +106,15 @@ class Cuda:
         return int(self._call("cuMemAlloc", size))
 
     def release(self, address: int) -> None:
+        self._call("cuCtxSetCurrent", self._context)  # of this thread, which may be another one than that which took it
         self._call("cuMemFree", address)
 
     def stream(self) -> Any:
         self._streams.append(self._call("cuStreamCreate", self.driver.CUstream_flags.CU_STREAM_NON_BLOCKING))
         return self._streams[-1]
+
+    def handle(self, stream: Any) -> int | None:
+        return int(stream)
 
     def upload(self, stream: Any, address: int, values: np.ndarray) -> None:
         if values.nbytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +12,7 @@ from symdyn.backend.c_records import fields_of
 from symdyn.errors import ArgumentError
 from symdyn.runtime.batches.states import Table
 from symdyn.runtime.gpu.device import Device
+from symdyn.runtime.gpu.turns import in_turns, parts_of
 from symdyn.runtime.inputs.tables import Pieces
 from symdyn.runtime.memory import in_bytes
 
@@ -40,7 +40,8 @@ class Work:
     span       t0, t_end, rtol, first step, largest step
     project    whether states are kept on what holds for them
     pieces, stops   inputs over time, and instants that steps end at
-    x, states, reports   results of n motions
+    look, event_spacing, taken_after   events to look for, (n_e,) of integers, empty: none; samples of them; steps between takes
+    x, states, reports, doubts   results of n motions
     """
 
     starts: np.ndarray
@@ -53,9 +54,13 @@ class Work:
     project: bool
     pieces: Pieces | None
     stops: np.ndarray
+    look: np.ndarray
+    event_spacing: float
+    taken_after: int
     x: np.ndarray
     states: np.ndarray
     reports: np.ndarray
+    doubts: np.ndarray
 
     @property
     def given(self) -> tuple[np.ndarray, ...]:
@@ -65,7 +70,7 @@ class Work:
     @property
     def results(self) -> tuple[np.ndarray, ...]:
         """What the kernel writes."""
-        return self.x, self.states, self.reports
+        return self.x, self.states, self.reports, self.doubts
 
     def bytes_each(self) -> int:
         """What one motion takes of the device's memory."""
@@ -97,6 +102,7 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     fixed = [np.ascontiguousarray(a, dtype=float) for a in (
         work.span, work.atol, work.times, work.stops,
         *((work.pieces.breaks, work.pieces.coefficients) if work.pieces is not None else (np.zeros(0), np.zeros(0))))]
+    fixed.append(np.ascontiguousarray(work.look, dtype=np.intc))
     # One row for all is copied once a slot.
     around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
     free = device.free()
@@ -121,28 +127,12 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
         for place, values in zip(places, fixed, strict=True):
             device.upload(slots[0].stream, place, values)
         device.wait(slots[0].stream)  # the other stream would not
-        _chunks(device, kernel, work, slots, places, _parts(n, size), threads)
+        in_turns(parts_of(n, size), slots, lambda slot, rows: _begin(device, kernel, work, slot, places, rows, threads),
+                 lambda slot: _collect(device, work, slot))
     finally:
         for address in taken:
             device.release(address)
     return f"on {device.name}, {min(threads, size)} at once, {in_bytes(SLOTS * size * work.bytes_each() + around)} of its memory"
-
-
-def _parts(n: int, size: int) -> Iterator[range]:
-    return (range(first, min(first + size, n)) for first in range(0, n, size))
-
-
-def _chunks(device: Device, kernel: Any, work: Work, slots: list[_Slot], places: list[int], parts: Iterator[range],
-            threads: int) -> None:
-    """One chunk after the other: while one is computed, the one before is copied back and the next one is brought."""
-    try:
-        for k, rows in enumerate(parts):
-            slot = slots[k % len(slots)]
-            _collect(device, work, slot)
-            _begin(device, kernel, work, slot, places, rows, threads)
-    finally:
-        for slot in sorted(slots, key=lambda s: s.rows.start if s.rows else 0):
-            _collect(device, work, slot)
 
 
 def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[int], rows: range, threads: int) -> None:
@@ -158,12 +148,13 @@ def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[in
     for values, address in ((headers, slot.tables), (np.zeros(1, dtype=np.intc), slot.counter)):
         device.upload(slot.stream, address, values)
         slot.kept.append(values)
-    span, atol, times, stops, breaks, coefficients = places
+    span, atol, times, stops, breaks, coefficients, look = places
     argument = Motions(
         n=n, n_out=len(work.times), max_steps=MOST_STEPS, given=slot.tables, span=span, atol=atol, t_out=times,
         n_pieces=0 if work.pieces is None else len(work.pieces.coefficients), breaks=breaks, pieces=coefficients,
-        n_stops=len(work.stops), stops=stops, project=int(work.project), x_out=slot.results[0], states=slot.results[1],
-        reports=slot.results[2], next=slot.counter)
+        n_stops=len(work.stops), stops=stops, project=int(work.project), look=look if len(work.look) else None,
+        event_spacing=work.event_spacing, events_taken_after=work.taken_after, x_out=slot.results[0], states=slot.results[1],
+        reports=slot.results[2], doubts=slot.results[3], next=slot.counter)
     device.launch(slot.stream, kernel, min(threads, n), argument)
     slot.rows = rows
 

@@ -139,6 +139,11 @@ class Inputs:
                 raise ArgumentError(message(what.removeprefix("the gradient of "), slopes, t, "the state"))
 
     @property
+    def by_tables(self) -> bool:
+        """Whether tables and numbers are all that they are given by."""
+        return self.pieces is not None and self.function is None and not self.samplers
+
+    @property
     def has_kinks(self) -> bool:
         """Whether a derivative of any of them jumps at times that are known."""
         return len(self.kinks) > 0

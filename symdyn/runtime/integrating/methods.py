@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from symdyn.backend.right_side import METHOD
 from symdyn.errors import ArgumentError
+from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.shown import shown
 
@@ -26,17 +27,17 @@ class CompiledMethod:
     """A method of the C backend.
 
     needs    functions that the module must have
-    unfit    why it does not take a module or a request, with what to use instead; empty if it does
+    unfit    why it does not take a module or inputs, with what to use instead; empty if it does
     kinked   what tolerances are multiplied by where functions of inputs may have kinks, which its estimate of errors underrates
     """
 
     name: str
     needs: tuple[str, ...] = ()
-    unfit: Callable[[Module, Request], str] = lambda module, request: ""
+    unfit: Callable[[Module, Inputs | None], str] = lambda module, inputs: ""
     kinked: float = 1.0
 
 
-def _constrained(module: Module, request: Request) -> str:
+def _constrained(module: Module) -> str:
     """Steps that are projected onto constraints are not symmetric: energy would drift as with any other method."""
     names = module.metadata.constraints
     if not names:
@@ -52,24 +53,24 @@ def _switching(module: Module, so: str) -> str:
     return f"{reason}, {so}; use method='{DEFAULT}'" if reason else ""
 
 
-def _not_expanded(module: Module, request: Request) -> str:
+def _not_expanded(module: Module, inputs: Inputs | None) -> str:
     """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
-    if request.inputs.function is not None or request.inputs.pieces is not None:
+    if inputs is not None and (inputs.function is not None or inputs.pieces is not None):
         return f"inputs that vary have no Taylor series; use method='{DEFAULT}', or write them as expressions of the time t"
     return _switching(module, "and has no Taylor series there")
 
 
-def _not_collocated(module: Module, request: Request) -> str:
+def _not_collocated(module: Module, inputs: Inputs | None) -> str:
     """Constant steps do not end at kinks and see few of them; tables have kinks at their times, functions are smooth if they are
     declared to be."""
-    if request.inputs.has_kinks:
+    if inputs is not None and inputs.has_kinks:
         return (f"inputs by a table have a kink at each of its times, which constant steps go across; use method='{DEFAULT}', "
                 "a smooth function of t and x, sd.Smooth(function), or expressions of the time t")
-    if request.inputs.may_have_kinks:
+    if inputs is not None and inputs.may_have_kinks:
         return (f"an input by a function may jump or have kinks, which constant steps go across; use method='{DEFAULT}', 'bs54', "
                 "'radau' or 'radau5', whose steps get shorter there, or declare a function that is smooth along the motion: "
                 "sd.Smooth(function)")
-    return _constrained(module, request) or _switching(module, "where it may have kinks, which constant steps go across")
+    return _constrained(module) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
 def _dense(stages: int) -> Callable[[Module, Request], str]:
@@ -104,6 +105,13 @@ def with_own_tolerances(request: Request, method: str) -> Request:
     return request if part == 1.0 else replace(request, rtol=max(part * request.rtol, SMALLEST_RTOL), atol=part * request.atol)
 
 
+def unfit(module: Module, method: str, inputs: Inputs | None) -> str:
+    """Why a compiled method does not take a module, or inputs (None: constants), with what to use instead; "" if it does."""
+    record = COMPILED[method]
+    missing = [n for n in record.needs if n not in module.metadata.functions]
+    return f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, inputs)
+
+
 def is_compiled(method: object) -> bool:
     return isinstance(method, str) and method in COMPILED
 
@@ -114,8 +122,6 @@ def check_compiled(module: Module, request: Request, method: str) -> None:
         instead = "'Radau'" if method.startswith("radau") else "'DOP853'"
         raise ArgumentError(f"{module.name}: the compiled integrator {shown(method)} needs the C backend; this module "
                             f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
-    record = COMPILED[method]
-    missing = [n for n in record.needs if n not in module.metadata.functions]
-    why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)
+    why = unfit(module, method, request.inputs)
     if why:
         raise ArgumentError(f"{module.name}: method {shown(method)} does not fit: {why}")

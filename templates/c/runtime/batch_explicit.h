@@ -5,13 +5,22 @@
 
 #include "batch.h"
 #include "simulate.h"
+#if SYMDYN_EVENTS
+#include "dropped_events.h"
+#endif
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void);
+#if SYMDYN_HAS_INPUTS
+SYMDYN_EXPORT void SYMDYN_NAME(batch_inputs)(void *memory, const symdyn_problem *problem);
+#endif
+#if SYMDYN_EVENTS
+SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double spacing, long taken_after, int *doubts);
+#endif
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
     const double *const *real, double *const *out, symdyn_report *reports);
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps);
 
-// Zeros until batch_start.
+// Zeros until batch_inputs, batch_look and batch_start.
 typedef struct {
     symdyn_states lanes;
     symdyn_vector k[SYMDYN_STAGES + 1][SYMDYN_NX];
@@ -23,7 +32,25 @@ typedef struct {
     double *x_out, *states;
     symdyn_report *report;
     long n, n_out, next, n_done;
+#if SYMDYN_HAS_INPUTS
+    symdyn_problem over_time;  // inputs that are the same for all, if they have pieces
+#endif
+#if SYMDYN_EVENTS
+    const int *look;  // 0: for none
+    double spacing;
+    long taken_after, attempts[SYMDYN_WIDTH];  // attempted steps of the trajectory
+    int *doubts;
+#endif
 } symdyn_batch;
+
+// State and slope of a run into its lane.
+static void symdyn_batch_state(symdyn_batch *batch, int l) {
+    const symdyn_run *run = batch->run + l;
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        LANE(batch->lanes.x[i], l) = run->x[i];
+        LANE(batch->k[0][i], l) = run->xd[i];
+    }
+}
 
 // Write the requested times that a lane has passed. Report on its trajectory if that has ended, and begin the next that does not
 // end at once, if there is one.
@@ -37,7 +64,15 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
             double *x = batch->x_out + row * batch->n_out * SYMDYN_NX;
             const int bad = run->status < 0 ? 0 : symdyn_serve(run, batch->t_out, batch->n_out, x, batch->written + l);
             if (bad) run->status = bad;
+#if SYMDYN_EVENTS
+            if (batch->look && (run->status != SYMDYN_STEP_LIMIT || batch->attempts[l] % batch->taken_after == 0))
+                symdyn_drop_events(run, batch->doubts + row);
+#endif
             if (run->status == SYMDYN_STEP_LIMIT) return;
+#if SYMDYN_EVENTS
+            if (run->status == SYMDYN_STOPPED && batch->n_out == 1 && batch->written[l] == 0)
+                for (int k = 0; k < SYMDYN_NX; k++) x[k] = run->x[k];  // the end alone is kept: where it ended
+#endif
             batch->row[l] = -1;
             batch->n_done++;
             SYMDYN_NAME(simulation_report)(run, batch->report + row, batch->states + row * 2 * SYMDYN_NX);
@@ -46,6 +81,13 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
         const long i = batch->row[l] = batch->next++;
         const int code = symdyn_lanes_take(&batch->lanes, l, i, batch->given + 1, p);
         batch->written[l] = 0;
+#if SYMDYN_HAS_INPUTS
+        problem.n_pieces = batch->over_time.n_pieces;
+        problem.breaks = batch->over_time.breaks;
+        problem.pieces = batch->over_time.pieces;
+        problem.n_stops = batch->over_time.n_stops;
+        problem.stops = batch->over_time.stops;
+#endif
 #if SYMDYN_HAS_CONSTRAINTS
         problem.length = batch->given[3].at[i * batch->given[3].row];
 #endif
@@ -55,15 +97,24 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
             run->status = SYMDYN_NO_CONSTANTS;
             run->reason = code;
         }
-        for (int k = 0; k < SYMDYN_NX; k++) {
-            LANE(batch->lanes.x[k], l) = run->x[k];
-            LANE(batch->k[0][k], l) = run->xd[k];
-        }
+#if SYMDYN_EVENTS
+        batch->attempts[l] = 0;
+        if (batch->look) SYMDYN_NAME(simulation_look)(run, batch->look, batch->spacing);
+#endif
+        symdyn_batch_state(batch, l);
     }
 }
 
 // The right-hand side; lanes where `failure` is set are skipped, those that fail set it.
 static void symdyn_batch_eval(symdyn_batch *batch, symdyn_vector t, const symdyn_vector *y, symdyn_vector *yd, int *failure) {
+#if SYMDYN_HAS_INPUTS
+    double inputs[SYMDYN_NIN];
+    for (int l = 0; l < SYMDYN_WIDTH && batch->over_time.n_pieces; l++) {
+        if (failure[l]) continue;
+        symdyn_inputs_at(&batch->over_time, LANE(t, l), 0, inputs);
+        for (int i = 0; i < SYMDYN_NIN; i++) LANE(batch->lanes.inputs[i], l) = inputs[i];
+    }
+#endif
     symdyn_lanes fault = symdyn_lanes_rhs(&batch->lanes, t, y, yd);
     symdyn_vector rest = VECTOR(0.0);
     for (int i = 0; i < SYMDYN_NX; i++) rest = MADD(y[i] + yd[i], 0.0, rest);
@@ -79,7 +130,7 @@ static void symdyn_batch_eval(symdyn_batch *batch, symdyn_vector t, const symdyn
 
 // The stages of a lane into its run.
 static void symdyn_batch_stages(symdyn_batch *batch, int l) {
-    for (int j = 0; j < SYMDYN_STAGES; j++)
+    for (int j = 0; j < SYMDYN_STAGES + SYMDYN_SLOPE_AT_END; j++)
         for (int i = 0; i < SYMDYN_NX; i++) batch->run[l].method.k[j][i] = LANE(batch->k[j][i], l);
 }
 
@@ -95,25 +146,45 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
     symdyn_vector t = VECTOR(0.0), h = t, t_new = t, sum = t, sum2 = t, y[SYMDYN_NX];
     double err[SYMDYN_WIDTH];
     int failure[SYMDYN_WIDTH], late[SYMDYN_WIDTH];
+#if SYMDYN_EVENTS
+    int waits[SYMDYN_WIDTH] = {0};  // there is no step now
+    for (int l = 0; l < SYMDYN_WIDTH && batch->look; l++) {
+        if (batch->row[l] < 0) continue;
+        batch->attempts[l]++;
+        waits[l] = symdyn_resume(batch->run + l);
+        symdyn_batch_state(batch, l);
+    }
+#endif
     for (int l = 0; l < SYMDYN_WIDTH; l++) {
         if ((failure[l] = batch->row[l] < 0)) continue;
+#if SYMDYN_EVENTS
+        if ((failure[l] = waits[l])) continue;
+#endif
         symdyn_propose(batch->run + l);
         LANE(t, l) = batch->run[l].t;
         LANE(h, l) = batch->run[l].h_try;
         LANE(t_new, l) = batch->run[l].t_new;
     }
     SYMDYN_EACH_STAGE(SYMDYN_BATCH_STAGE)
+#if SYMDYN_SLOPE_AT_END
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + h * (SYMDYN_B(k, i));
+    symdyn_batch_eval(batch, t_new, y, k[SYMDYN_STAGES], failure);
+#endif
     for (int i = 0; i < SYMDYN_NX; i++) {
         const symdyn_vector e = SYMDYN_E(k, i);
+        symdyn_vector size = x[i], scale;
+#if SYMDYN_SECOND_ERROR
         const symdyn_vector slope = SYMDYN_B(k, i);
         const symdyn_vector e2 = SYMDYN_SECOND(k, i, slope);
-        symdyn_vector size = x[i], scale;
         y[i] = x[i] + h * slope;
+#endif
         for (int l = 0; l < SYMDYN_WIDTH; l++)
             LANE(size, l) = fabs(LANE(x[i], l)) > fabs(LANE(y[i], l)) ? fabs(LANE(x[i], l)) : fabs(LANE(y[i], l));
         scale = 1.0 / (batch->atol[i] + batch->span[2] * size + 1e-300);
         sum += (e * scale) * (e * scale);
+#if SYMDYN_SECOND_ERROR
         sum2 += (e2 * scale) * (e2 * scale);
+#endif
     }
     sum2 = sum + 0.01 * sum2;
     for (int l = 0; l < SYMDYN_WIDTH; l++)
@@ -135,35 +206,84 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
         for (int i = 0; i < SYMDYN_NX; i++) LANE(y[i], l) = end[i];
     }
 #endif
+    // The slopes at the ends; methods that know them need them again where projection has moved the end.
+    const symdyn_vector *end = k[SYMDYN_STAGES];
+#if SYMDYN_SLOPE_AT_END && SYMDYN_PROJECTS
+    symdyn_vector slope[SYMDYN_NX];
+    int any = 0;
+    for (int l = 0; l < SYMDYN_WIDTH; l++) any |= !(late[l] = failure[l] || !(err[l] <= 1.0) || !moved[l]);
+    if (any) symdyn_batch_eval(batch, t_new, y, slope, late);
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        const int known = failure[l] || !(err[l] <= 1.0) || !moved[l];
+        if (known) late[l] = failure[l] || !(err[l] <= 1.0);
+        for (int i = 0; i < SYMDYN_NX; i++)
+            if (known) LANE(slope[i], l) = LANE(end[i], l);
+    }
+    end = slope;
+#endif
+#if SYMDYN_SLOPE_AT_END && !SYMDYN_PROJECTS
+    for (int l = 0; l < SYMDYN_WIDTH; l++) late[l] = failure[l];
+#endif
+#if !SYMDYN_SLOPE_AT_END
     for (int l = 0; l < SYMDYN_WIDTH; l++) late[l] = failure[l] || !(err[l] <= 1.0);
     symdyn_batch_eval(batch, t_new, y, k[SYMDYN_STAGES], late);
+#endif
     for (int l = 0; l < SYMDYN_WIDTH; l++) {
         symdyn_run *run = batch->run + l;
         const double root = symdyn_root(err[l] > 1e-8 ? err[l] : 1e-8);
         double x_new[SYMDYN_NX], xd_new[SYMDYN_NX];
         if (batch->row[l] < 0) continue;
+#if SYMDYN_EVENTS
+        if (waits[l]) {
+            symdyn_batch_next(batch, l);
+            continue;
+        }
+#endif
 #if SYMDYN_PROJECTS
         if (again[l]) continue;  // another step is tried
         if (!late[l]) symdyn_note_projection(run, moved[l]);
 #endif
         for (int i = 0; i < SYMDYN_NX; i++) {
             x_new[i] = LANE(y[i], l);
-            xd_new[i] = LANE(k[SYMDYN_STAGES][i], l);
+            xd_new[i] = LANE(end[i], l);
         }
         symdyn_judge(run, failure[l] ? failure[l] : err[l] <= 1.0 ? late[l] : 0, err[l], root, x_new, xd_new);
         if (!run->rejected) {
             const long next = batch->written[l];
-            if (next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0) symdyn_batch_stages(batch, l);
-            for (int i = 0; i < SYMDYN_NX; i++) {
-                LANE(batch->lanes.x[i], l) = x_new[i];
-                LANE(k[0][i], l) = xd_new[i];
-            }
+            int within = next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0;
+#if SYMDYN_EVENTS
+            within |= batch->look != 0;
+#endif
+            if (within) symdyn_batch_stages(batch, l);
+#if SYMDYN_EVENTS
+            if (batch->look) symdyn_look_for_events(run);
+#endif
+            symdyn_batch_state(batch, l);
         }
         symdyn_batch_next(batch, l);
     }
 }
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_batch); }
+
+#if SYMDYN_HAS_INPUTS
+// Inputs over time, the same for all: pieces and stops of the problem; they have to stay.
+SYMDYN_EXPORT void SYMDYN_NAME(batch_inputs)(void *memory, const symdyn_problem *problem) {
+    ((symdyn_batch *)memory)->over_time = *problem;
+}
+#endif
+
+#if SYMDYN_EVENTS
+// Which events to look for, by samples no further apart than spacing, s (0: any); as if they were taken after so many attempted
+// steps; doubts: of every trajectory, zeros. All have to stay.
+SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double spacing, long taken_after, int *doubts) {
+    symdyn_batch *const batch = (symdyn_batch *)memory;
+    batch->look = look;
+    batch->spacing = spacing;
+    batch->taken_after = taken_after;
+    batch->doubts = doubts;
+}
+#endif
 
 // given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP), with constraints the lengths that residuals are
 // measured by (1); counts: trajectories, output times; real: span (t0, t_end, rtol, first step, largest step), atol (SYMDYN_NX),

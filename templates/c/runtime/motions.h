@@ -2,13 +2,11 @@
 // them all. A thread that is through takes the next trajectory, so that none waits for the longest motion of its warp.
 #pragma once
 
+#include "kernel.h"
 #include "motions_type.h"
 #include "simulate.h"
-
-#if defined(__CUDACC__)
-#define SYMDYN_KERNEL extern "C" __global__
-#else
-#define SYMDYN_KERNEL SYMDYN_EXPORT
+#if SYMDYN_EVENTS
+#include "dropped_events.h"
 #endif
 
 enum { SYMDYN_NUMBERS = SYMDYN_NP + SYMDYN_NC + SYMDYN_NIN + !(SYMDYN_NP + SYMDYN_NC + SYMDYN_NIN) };
@@ -45,6 +43,9 @@ static void symdyn_begin_motion(const symdyn_motions *motions, long i, double *n
         .length = length.at[i * length.row],
     };
     SYMDYN_NAME(simulation_start)(run, &problem, motions->span, x0, motions->atol);
+#if SYMDYN_EVENTS
+    if (motions->look) SYMDYN_NAME(simulation_look)(run, motions->look, motions->event_spacing);
+#endif
     if (code || !symdyn_all_finite(c, SYMDYN_NC)) {
         run->status = SYMDYN_NO_CONSTANTS;
         run->reason = code ? code : SYMDYN_NOT_FINITE;
@@ -56,6 +57,7 @@ SYMDYN_KERNEL void SYMDYN_NAME(motions)(symdyn_motions motions) {
     symdyn_run run;
     double numbers[SYMDYN_NUMBERS];
     long i = -1, written = 0, left = 0;
+    int doubts = 0;
     for (;;) {
         if (i < 0) {
             i = symdyn_next_motion(motions.next);
@@ -63,15 +65,26 @@ SYMDYN_KERNEL void SYMDYN_NAME(motions)(symdyn_motions motions) {
             symdyn_begin_motion(&motions, i, numbers, &run);
             written = 0;
             left = motions.max_steps;
+            doubts = 0;
         }
         const int failure = run.status < 0
             ? 0
             : symdyn_serve(&run, motions.t_out, motions.n_out, motions.x_out + i * motions.n_out * SYMDYN_NX, &written);
         if (failure) run.status = failure;
+#if SYMDYN_EVENTS
+        if (run.status != SYMDYN_STEP_LIMIT || (motions.max_steps - left) % motions.events_taken_after == 0)
+            symdyn_drop_events(&run, &doubts);
+#endif
         if (run.status == SYMDYN_STEP_LIMIT && left > 0) {
             left--;
             symdyn_attempt(&run);
         } else {
+            motions.doubts[i] = doubts;
+#if SYMDYN_EVENTS
+            if (run.status == SYMDYN_STOPPED && motions.n_out == 1)  // where the end alone is kept, that is where it ended
+                for (; written < 1; written++)
+                    for (int k = 0; k < SYMDYN_NX; k++) motions.x_out[i * SYMDYN_NX + k] = run.x[k];
+#endif
             for (; written < motions.n_out; written++)  // what was not reached
                 for (int k = 0; k < SYMDYN_NX; k++) motions.x_out[(i * motions.n_out + written) * SYMDYN_NX + k] = 0.0 / 0.0;
             SYMDYN_NAME(simulation_report)(&run, motions.reports + i, motions.states + i * 2 * SYMDYN_NX);

@@ -12,8 +12,12 @@ typedef struct {
     const double *breaks, *pieces;
     long n_stops;
     const double *stops;
-    int project;             // see problem_type.h
-    double *x_out, *states;  // states at the output times; two states of every report
+    int project;              // see problem_type.h
+    const int *look;          // which events to look for; 0: none
+    double event_spacing;     // of samples of their quantities at the most, s; 0: any
+    long events_taken_after;  // attempted steps, as a caller of one run takes them
+    double *x_out, *states;   // states at the output times; two states of every report
     symdyn_report *reports;
-    int *next;  // the first trajectory that no thread has taken
+    int *doubts;  // of every trajectory, see dropped_events.h
+    int *next;    // the first trajectory that no thread has taken
 } symdyn_motions;

@@ -3,6 +3,14 @@
 
 #include "prelude.h"
 
+#if SYMDYN_SINGLE
+static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
+    for (int i = 0; i < n; i++) {
+        sines[i] = sin(angles[i]);
+        cosines[i] = cos(angles[i]);
+    }
+}
+#else
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
 // The angle is reduced to h + l = x - n*pi/2 with |h| <= pi/4, where l is what rounding cuts off h. pi/2 has three parts,
 // the first two of 37 bits, so that their products with n are exact. Polynomials in z = h*h give sin(h + l) and cos(h + l);
@@ -57,3 +65,4 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
         }
     }
 }
+#endif

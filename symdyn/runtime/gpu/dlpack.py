@@ -1,0 +1,163 @@
+"""Arrays of other libraries on a device, by the protocol DLPack, in and out: JAX's, CuPy's, PyTorch's, without a copy.
+
+Records and rules: https://dmlc.github.io/dlpack/latest (version 0.8, which all consumers take).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.shown import shown
+
+# The types of devices: the processor, CUDA.
+CPU, CUDA = 1, 2
+_FLOAT = 2
+_NAME = b"dltensor"
+
+
+class _Tensor(ctypes.Structure):
+    _fields_ = [("data", ctypes.c_void_p), ("device_type", ctypes.c_int32), ("device_id", ctypes.c_int32),
+                ("ndim", ctypes.c_int32), ("code", ctypes.c_uint8), ("bits", ctypes.c_uint8), ("lanes", ctypes.c_uint16),
+                ("shape", ctypes.POINTER(ctypes.c_int64)), ("strides", ctypes.POINTER(ctypes.c_int64)),
+                ("byte_offset", ctypes.c_uint64)]
+
+
+_Deleter = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+
+
+class _Managed(ctypes.Structure):
+    _fields_ = [("tensor", _Tensor), ("context", ctypes.c_void_p), ("deleter", _Deleter)]
+
+
+_Destructor = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
+_new = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_char_p, _Destructor)(("PyCapsule_New", ctypes.pythonapi))
+_pointer = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)(("PyCapsule_GetPointer", ctypes.pythonapi))
+_is_valid = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p)(("PyCapsule_IsValid", ctypes.pythonapi))
+_pointer_of = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)(("PyCapsule_GetPointer", ctypes.pythonapi))
+
+
+class OnDevice(Protocol):
+    """An array that other libraries may read where it lies."""
+
+    def __dlpack__(self, *, stream: int | None = None) -> object:
+        """The capsule of the protocol."""
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """Type and number of the device."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Numbers of an array on a device: address of the first one, shape and strides in numbers; `kept` keeps them there."""
+
+    address: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    kept: Any
+
+
+def is_on(values: Any, kind: int, number: int) -> bool:
+    """Whether values are an array of another library on the device of this type and number."""
+    if isinstance(values, np.ndarray) or not (hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")):
+        return False
+    where = values.__dlpack_device__()
+    return (int(where[0]), int(where[1])) == (kind, number)
+
+
+def view(values: Any, stream: int | None, dtype: np.dtype, owner: str, what: str) -> View:
+    """An array of another library, which waits for what its own stream still does.
+
+    stream   of the device, that it is read in; None on the processor
+    what     it is, in messages
+    Raises ArgumentError where its numbers are not of the type.
+    """
+    capsule = values.__dlpack__() if stream is None else values.__dlpack__(stream=stream)
+    tensor = _Managed.from_address(_pointer(capsule, _NAME)).tensor
+    shape = tuple(tensor.shape[k] for k in range(tensor.ndim))
+    if (tensor.code, tensor.bits, tensor.lanes) != (_FLOAT, 8 * dtype.itemsize, 1):
+        kind = {0: "int", 1: "unsigned", _FLOAT: "float", 6: "bool"}.get(tensor.code, "other")
+        precision = "double" if dtype.itemsize == 8 else "single"
+        raise ArgumentError(f"{owner}: {what} is an array of {kind}{tensor.bits} on the device, and precision={precision!r} "
+                            f"takes {dtype.name} there; convert it, or pass another precision")
+    strides = tuple(tensor.strides[k] for k in range(tensor.ndim)) if tensor.strides else tuple(
+        int(np.prod(shape[k + 1:], dtype=int)) for k in range(len(shape)))
+    return View(int(tensor.data or 0) + tensor.byte_offset, shape, strides, capsule)
+
+
+_exported: dict[int, tuple[Any, ...]] = {}
+_numbers = itertools.count(1)
+
+
+def _forget(address: int) -> None:
+    _exported.pop(_Managed.from_address(address).context, None)
+
+
+def _unused(capsule: int) -> None:
+    if _is_valid(capsule, _NAME):  # nobody has taken it
+        _forget(_pointer_of(capsule, _NAME))
+
+
+_deleter, _destructor = _Deleter(_forget), _Destructor(_unused)
+
+
+class DeviceArray:
+    """Numbers on a device, which JAX, CuPy and PyTorch take by `from_dlpack`, without a copy; the memory is given back when
+    nobody has them any more.
+
+    shape, dtype   as of NumPy's arrays, row by row or, as `by_entry`, entry by entry
+
+    >>> from symdyn.runtime.gpu.dlpack import CPU, DeviceArray
+    >>> here = np.arange(6.0)
+    >>> rows = DeviceArray(here.ctypes.data, (2, 3), np.dtype(float), (CPU, 0), lambda: None, lambda: here.reshape(2, 3))
+    >>> np.from_dlpack(rows)[1]
+    array([3., 4., 5.])
+    """
+
+    def __init__(self, address: int, shape: tuple[int, int], dtype: np.dtype, where: tuple[int, int],
+                 release: Callable[[], None], fetch: Callable[[], np.ndarray], by_entry: bool = False) -> None:
+        self.shape, self.dtype, self.by_entry = shape, dtype, by_entry
+        self._address, self._where, self._release, self._fetch = address, where, release, fetch
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __repr__(self) -> str:
+        return f"<DeviceArray {self.shape[0]} x {self.shape[1]} of {self.dtype.name}>"
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return self._where
+
+    def __dlpack__(self, *, stream: Any = None, max_version: Any = None, dl_device: Any = None, copy: Any = None) -> Any:
+        """The capsule of the protocol; what has been computed is there, whatever the stream. Raises BufferError for a copy."""
+        if copy or (dl_device is not None and tuple(dl_device) != self._where):
+            raise BufferError(f"{self!r} is given as it is, where it is; leave copy and dl_device out")
+        managed, key = _Managed(), next(_numbers)
+        rows, entries = self.shape
+        steps = (1, rows) if self.by_entry else (entries, 1)
+        shape, strides = (ctypes.c_int64 * 2)(rows, entries), (ctypes.c_int64 * 2)(*steps)
+        managed.tensor = _Tensor(self._address, *self._where, 2, _FLOAT, 8 * self.dtype.itemsize, 1,
+                                 ctypes.cast(shape, ctypes.POINTER(ctypes.c_int64)),
+                                 ctypes.cast(strides, ctypes.POINTER(ctypes.c_int64)), 0)
+        managed.context, managed.deleter = key, _deleter
+        _exported[key] = managed, shape, strides, self
+        return _new(ctypes.addressof(managed), _NAME, _destructor)
+
+    def to_numpy(self) -> np.ndarray:
+        """A copy in the memory of this process."""
+        return self._fetch()
+
+    def __del__(self) -> None:
+        self._release()
+
+
+def demand_rows(found: View, width: int, owner: str, what: str) -> None:
+    """Raises ArgumentError where an array on the device has not as many columns."""
+    if len(found.shape) != 2 or found.shape[1] != width:
+        raise ArgumentError(f"{owner}: {what} has the shape {shown(found.shape)} on the device, needed is (n, {width})")
