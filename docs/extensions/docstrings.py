@@ -25,7 +25,7 @@ CODE = re.compile("`[^`]+`")
 # Classes whose objects are results.
 MADE = {"Module", "Solution", "Equations", "Linearization", "Campbell", "Carried", "Rest", "Equilibrium", "RootLocus", "Modes",
         "PeriodicMotion", "Regulator", "Response", "Stability", "Ensemble", "Fit", "Identification", "Optimum", "View",
-        "MotionEquations", "AugmentedEquations", "BatchSolution", "Equilibria", "Mode", "Actuation"}
+        "MotionEquations", "AugmentedEquations", "BatchSolution", "DeviceArray", "Equilibria", "Mode", "Actuation"}
 MARKUP = re.compile(r"([\\*|`]|_\b|\b_)")
 
 

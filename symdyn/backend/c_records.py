@@ -10,7 +10,7 @@ from typing import Any
 from symdyn.errors import SymdynError
 from symdyn.folders import templates_folder
 
-_NUMBERS: dict[str, Any] = {"double": ctypes.c_double, "int": ctypes.c_int, "long": ctypes.c_long}
+_NUMBERS: dict[str, Any] = {"double": ctypes.c_double, "int": ctypes.c_int, "long": ctypes.c_long, "symdyn_time": ctypes.c_double}
 _RESULTS: dict[str, Any] = {**_NUMBERS, "void": None}
 _RECORD = re.compile(r"typedef struct \{(?P<body>.*?)\} (?P<name>[\w{} ]+);", re.DOTALL)
 _FUNCTION = re.compile(r"(?P<result>\w+) \(\*(?P<name>\w+)\)\((?P<arguments>[^)]*)\)")

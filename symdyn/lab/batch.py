@@ -6,25 +6,33 @@ All figures of one line come from one run; the programs take turns, and of each 
 from __future__ import annotations
 
 import ctypes
+import re
+import subprocess
+import tempfile
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import symdyn as sd
+from symdyn.emission import emit
 from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
 from symdyn.lab.figures import Figure, print_figures
 from symdyn.lab.peers.benchmark import random_state
 from symdyn.lab.peers.description import describe
 from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
 from symdyn.lab.peers.symdyn_peer import symdyn_program
 from symdyn.runtime.batches.states import UNIT, tables_of
+from symdyn.runtime.building.compiler import flags, require_compiler
 from symdyn.runtime.building.library import Frame
 from symdyn.runtime.module import Module
 from symdyn.timing.loops import best_times
 
 STATES = 2000
+ARITHMETIC = re.compile(r"\s*v(add|sub|mul|div|sqrt|fn?m)\w*")
 REPEATS = 100
 PENDULUMS = 10_000
 SINGLE = 200
@@ -75,6 +83,30 @@ def chain() -> Iterator[Figure]:
         yield "spatial_chain(7): Pinocchio's ABA in C++", times[4] * 1e9, "ns", ""
         yield "spatial_chain(7): many at once are quicker than Pinocchio by", times[4] / batch, "x", ">= 25"
     yield "spatial_chain(7): the bits of one state", float(same), "", ">= 1"
+    for what, number in stack_traffic(equations).items():
+        yield f"spatial_chain(7): {what}", number, "", ""
+
+
+def stack_traffic(equations: Equations) -> dict[str, int]:
+    """Instructions on the widest vectors in the machine code of many right-hand sides, and those that store vectors on the stack
+    and load them from there, as registers are too few; none where the compiler writes no assembly of x86 with wide vectors."""
+    text = next(iter(emit(equations, "c", ["rhs"], standalone=False, integrator=False, batch=True).files.values()))
+    compiler = require_compiler()
+    with tempfile.TemporaryDirectory() as folder:
+        source, assembly = Path(folder, "batch.c"), Path(folder, "batch.s")
+        source.write_text(text, encoding="utf-8")
+        options = [o for o in flags(compiler) if o not in ("-shared", "-fPIC")]
+        done = subprocess.run([*compiler.command, *options, "-S", "-masm=intel", "-o", str(assembly), str(source)],
+                              capture_output=True)
+        lines = assembly.read_text(encoding="utf-8").splitlines() if done.returncode == 0 else []
+    widest = "zmm" if any("zmm" in line for line in lines) else "ymm"
+    wide = [line.split("#")[0] for line in lines if widest in line]
+    stack = [line for line in wide if "[rsp" in line or "[rbp" in line]
+    stores = [line for line in stack if re.match(r"\s*vmov\w+\s+[A-Z]* ?PTR", line)]
+    if not wide:
+        return {}
+    return {"sums, products and quotients of vectors": sum(bool(ARITHMETIC.match(line)) for line in wide),
+            "stores of vectors to the stack": len(stores), "loads of vectors from there": len(stack) - len(stores)}
 
 
 def _direct(module: Module, x: np.ndarray, out: np.ndarray) -> Callable[[], Any]:

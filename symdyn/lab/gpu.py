@@ -16,7 +16,9 @@ import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError
 from symdyn.lab.figures import Figure, print_figures
+from symdyn.runtime.batches.precision import PRECISIONS
 from symdyn.runtime.gpu import compiling, device
+from symdyn.runtime.gpu.dlpack import DeviceArray
 from symdyn.runtime.module import Module
 
 ARCHITECTURE = "sm_90"
@@ -24,6 +26,11 @@ COUNT = 1_000_000
 # So many motions are integrated on the processor, too: for the time of one, and to be compared with.
 COMPARED = 2_000
 TOLERANCE = 1e-8
+# Operations and bytes a second of an H200 by its data sheet, sums and products counted apart, and no tensor units.
+OPERATIONS, BYTES = {"double": 34e12, "single": 67e12}, 4.8e12
+# Evaluations a second that right-hand sides of seven links in space are to reach.
+GOALS = {"double": ">= 1e9", "single": ">= 5e9"}
+ROUNDS = 20
 # Double pendulums are chaotic from some energy on; from these starts no motion magnifies rounding beyond the bound.
 CASES = {"double_pendulum": (0.5, 10.0), "spatial_chain": (0.2, 1.0), "four_bar": (0.0, 1.0)}
 
@@ -43,7 +50,13 @@ def four_bar() -> Iterator[Figure]:
     return _figures("four_bar")
 
 
-GROUPS = (double_pendulum, spatial_chain, four_bar)
+def right_sides() -> Iterator[Figure]:
+    """Right-hand sides of seven links in space, in double and single precision."""
+    for precision in PRECISIONS:
+        yield from _rates("spatial_chain", precision)
+
+
+GROUPS = (double_pendulum, spatial_chain, four_bar, right_sides)
 
 
 def run(only: Sequence[str] | None = None) -> int:
@@ -67,10 +80,10 @@ def _figures(name: str) -> Iterator[Figure]:
     yield from _compared(module, unit, name)
 
 
-def _resources(text: str, name: str) -> dict[str, float]:
-    """Registers, and bytes of the stack, that the compiler reports of the kernel."""
+def _resources(text: str, name: str, kernel: str = "motions") -> dict[str, float]:
+    """Registers, and bytes of the stack, that the compiler reports of a kernel."""
     log = compiling.report(text, name, ARCHITECTURE)
-    kernel = log.partition("_motions' for")[2]
+    kernel = log.partition(f"_{kernel}' for")[2]
     found = {"registers": r"Used (\d+) registers", "bytes of stack": r"(\d+) bytes stack frame",
              "bytes of spilled registers": r"(\d+) bytes spill stores"}
     return {what: float(match[1]) if (match := re.search(pattern, kernel)) else np.nan for what, pattern in found.items()}
@@ -97,3 +110,32 @@ def _compared(module: Module, unit: Any, name: str) -> Iterator[Figure]:
     yield f"{name}: right-hand sides", evaluations / seconds, "1/s", ""
     yield f"{name}: their operations", evaluations * unit.metadata.operations["rhs"] / seconds, "1/s", ""
     yield f"{name}: bytes copied", float(starts.nbytes + speeds.nbytes + there.x.nbytes) / seconds, "1/s", ""
+
+
+def _rates(name: str, precision: str) -> Iterator[Figure]:
+    """What a kernel of right-hand sides takes, what bounds it, and how fast it is with states that lie on the device."""
+    module = sd.systems.get(name).compile(backend="c")
+    unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
+    for what, value in _resources(unit.source, name, "states").items():
+        yield f"{name} rhs, {precision}: {what} of a thread, for {ARCHITECTURE}", value, "", ""
+    dtype, n_x = np.dtype(PRECISIONS[precision]), module.metadata.sizes.x
+    operations, moved = unit.metadata.operations["rhs"], 2 * n_x * dtype.itemsize + 4
+    yield f"{name} rhs, {precision}: operations", operations, "", ""
+    yield f"{name} rhs, {precision}: bytes read and written", moved, "", ""
+    yield f"{name} rhs, {precision}: an H200's bound by operations", OPERATIONS[precision] / operations, "1/s", ""
+    yield f"{name} rhs, {precision}: an H200's bound by bytes", BYTES / moved, "1/s", ""
+    try:
+        there = device.open_device(0, name)
+    except ArgumentError:
+        return
+    x = np.random.default_rng(6).normal(size=(n_x, COUNT)).astype(dtype)
+    address, stream = there.allocate(x.nbytes), there.stream()
+    there.upload(stream, address, x)
+    there.wait(stream)
+    states = DeviceArray(address, (COUNT, n_x), dtype, there.where, lambda: there.release(address), lambda: x.T, True)
+    out = module.rhs_batch(0.0, states, device="gpu", precision=precision)
+    begun = clock.perf_counter()
+    for _ in range(ROUNDS):
+        module.rhs_batch(0.0, states, out=out, device="gpu", precision=precision)
+    rate = ROUNDS * COUNT / (clock.perf_counter() - begun)
+    yield f"{name} rhs, {precision}: of states on the device, codes copied", rate, "1/s", GOALS[precision]

@@ -823,7 +823,7 @@ class Module:
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
                        interpolation: str = "linear", extend: str = "error",
                        sensitivities: Names | Named[Row] | None = None,
-                       sensitivity_control: bool = True, device: str = "cpu") -> BatchSolution:
+                       sensitivity_control: bool = True, device: str = "cpu", precision: str = "double") -> BatchSolution:
         """Integrate many motions of one mechanism, each with its own steps.
 
         q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
@@ -833,18 +833,20 @@ class Module:
                     sampled controller is asked in one motion after the other)
         t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
         rtol, atol, max_step, first_step   as for `simulate`
-        method, max_steps, stabilization, events, event_spacing   as for `simulate`, too; with others than the default, and with
-                    events, they run one by one
+        method, max_steps, stabilization, events, event_spacing   as for `simulate`, too
         sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions, which run one by one then; see
                     `BatchSolution.sensitivity`
 
         device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
                     mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits
 
+        precision   of the device: "double", or "single": float32, with rtol from 1e-6 on, compensated sums over steps, times in
+                    doubles; without constraints and events, by explicit methods
+
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
-        `simulate` takes, projections onto constraints included, and a lane that is through goes on with the next motion.
-        Mechanisms with events or rigid contacts, inputs that vary over time, other methods and options, and the NumPy backend run
-        one by one through `simulate`; `note` of the solution documents it.
+        `simulate` takes, projections onto constraints, events with resets and inputs by tables included, by `dop853` or `bs54`,
+        and a lane that is through goes on with the next motion. Mechanisms with rigid contacts, inputs by functions, implicit
+        methods, other options, and the NumPy backend run one by one through `simulate`; `note` of the solution documents it.
 
         A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions
@@ -860,7 +862,8 @@ class Module:
         return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
                               first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
                               events=events, event_spacing=event_spacing, interpolation=interpolation, extend=extend,
-                              sensitivities=sensitivities, sensitivity_control=sensitivity_control, device=device)
+                              sensitivities=sensitivities, sensitivity_control=sensitivity_control, device=device,
+                              precision=precision)
 
     # -- statics and linearization
 

@@ -37,7 +37,7 @@ Build = Callable[..., ctypes.CDLL]
 def build(tmp_path: Path) -> Build:
     """build(text): the library of a text that includes parts, in which no tool that is here finds a fault."""
     def library(text: str, *options: str) -> ctypes.CDLL:
-        threads = "" if "SYMDYN_THREADS" in text else "#define SYMDYN_THREADS 0\n"
+        threads = "".join(f"#define {name} 0\n" for name in ("SYMDYN_THREADS", "SYMDYN_SINGLE") if name not in text)
         (tmp_path / "main.c").write_text(threads + text)
         made = tmp_path / "main.so"
         done = subprocess.run([*require_compiler().command, *STRICT, *options, f"-I{RUNTIME}", f"-I{tmp_path}", "-o", made,

@@ -514,20 +514,28 @@ enum {
     SYMDYN_RESET_NOT_SMOOTH = -12   // what the constraints make of a reset has no derivative
 };
 
+// The type of times, which stay doubles where all else is in single precision.
+
+typedef double symdyn_time;
+
 typedef struct {
     symdyn_problem problem;
-    double t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
-    double t_end, direction;  // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
-    double t_slack, h_floor;  // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
-    double h, h_max;          // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
-    double h_try, h_min, t_new, t_new_low;  // the step that is tried: its length with sign, the shortest one, its end
-    double h_cut;                           // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
-    double rtol, atol[SYMDYN_NX];           // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
-    double root_old;                        // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
-    double x[SYMDYN_NX], xd[SYMDYN_NX];     // state at t and its derivative
-    double t_old, h_old, x_old[SYMDYN_NX];  // start of the latest accepted step, its length, with sign, the state there
-    int dense_ready, unstored;              // what is needed within the latest step is prepared; (t, x) is not stored yet
-    int rejected, status;                   // the latest attempt was rejected: do not lengthen the step
+    symdyn_time t, t_low;  // present time, and what rounding has cut off it: the time is t + t_low
+    symdyn_time t_end;     // where the run ends, hit exactly
+    double direction;      // sign of t_end - t0 (0 if they are equal)
+    symdyn_time t_slack,
+        h_floor;          // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
+    double h, h_max;      // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min;  // the step that is tried: its length with sign, the shortest one,
+    symdyn_time t_new, t_new_low;        // its end
+    double h_cut;                        // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
+    double rtol, atol[SYMDYN_NX];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;                     // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
+    double x[SYMDYN_NX], xd[SYMDYN_NX];  // state at t and its derivative
+    symdyn_time t_old;                        // start of the latest accepted step,
+    double h_old, x_old[SYMDYN_NX];           // its length, with sign, the state there
+    int dense_ready, unstored;                // what is needed within the latest step is prepared; (t, x) is not stored yet
+    int rejected, status;                     // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
     // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
     // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
@@ -549,7 +557,8 @@ typedef struct {
     symdyn_method method;
 } symdyn_run;
 
-static const double symdyn_eps = 2.220446049250313e-16, symdyn_huge = 1.7976931348623157e308;
+static const double symdyn_eps = 2.220446049250313e-16, symdyn_huge = 1.7976931348623157e308, symdyn_tiny = 1e-300;
+static const symdyn_time symdyn_time_eps = 2.220446049250313e-16;
 
 // Record a failure; returns its status.
 static int symdyn_fail(symdyn_run *run, int status, int reason, long bad_index, double t, const double *x) {
@@ -575,7 +584,7 @@ static int symdyn_eval(symdyn_run *run, double t, const double *y, double *xd) {
 // One over the tolerated error of state i in a step from run->x to x_new; finite also for x = 0 without atol.
 static inline double symdyn_scale(const symdyn_run *run, int i, double x_new) {
     const double size = fabs(run->x[i]) > fabs(x_new) ? fabs(run->x[i]) : fabs(x_new);
-    return 1.0 / (run->atol[i] + run->rtol * size + 1e-300);
+    return 1.0 / (run->atol[i] + run->rtol * size + symdyn_tiny);
 }
 
 // The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, does not count.
@@ -605,6 +614,8 @@ static inline double symdyn_root(double v) {
 
 // A step of an embedded explicit Runge-Kutta pair, and its polynomial.
 
+#define symdyn_moved(run, i, change) ((run)->x[i] + (change))
+
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
 SYMDYN_LINKED int symdyn_try(
     symdyn_run *run, double h, double t_new, double *restrict x_new, double *restrict xd_new, double *restrict err) {
@@ -618,7 +629,7 @@ SYMDYN_LINKED int symdyn_try(
         const double e = SYMDYN_E(k, i);
         const double slope = SYMDYN_B(k, i);
         const double e2 = SYMDYN_SECOND(k, i, slope);
-        x_new[i] = x[i] + h * slope;
+        x_new[i] = symdyn_moved(run, i, h * slope);
         const double scale = symdyn_scale(run, i, x_new[i]);
         sum += (e * scale) * (e * scale);
         sum2 += (e2 * scale) * (e2 * scale);
@@ -629,7 +640,7 @@ SYMDYN_LINKED int symdyn_try(
 }
 
 // See explicit_again.h.
-SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err);
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err);
 SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run);
 
 // Row j of the dense output.
@@ -658,7 +669,7 @@ static int symdyn_prepare_dense(symdyn_run *run) {
 }
 
 // The state at s within the latest step.
-SYMDYN_LINKED int symdyn_between(symdyn_run *run, double s, double *x_out) {
+SYMDYN_LINKED int symdyn_between(symdyn_run *run, symdyn_time s, double *x_out) {
     const double theta = (s - run->t_old) / run->h_old, rest = 1.0 - theta;
     int failure;
     if (!run->dense_ready && (failure = symdyn_prepare_dense(run))) return failure;
@@ -681,15 +692,15 @@ SYMDYN_LINKED int symdyn_between(symdyn_run *run, double s, double *x_out) {
 
 SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void);
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
-    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
+    void *memory, const symdyn_problem *problem, const symdyn_time *span, const double *x0, const double *atol);
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
-    void *memory, int every, long max_steps, double *t, long n, double *x, long *written);
+    void *memory, int every, long max_steps, symdyn_time *t, long n, double *x, long *written);
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states);
 
 // Where the polynomial of an embedded explicit Runge-Kutta pair is not good enough, and steps across singular configurations.
 
 // The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
-SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err) {
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err) {
     symdyn_run again = *run;
     double xd[SYMDYN_NX];
     again.t = from_end ? run->t : run->t_old;
@@ -723,7 +734,7 @@ SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run) {
 // States within the latest step, and the start of a run.
 
 // The state at s within the latest step, on the constraints. Returns 0 or a failure.
-static int symdyn_state_at(symdyn_run *run, double s, double *x) {
+static int symdyn_state_at(symdyn_run *run, symdyn_time s, double *x) {
     int failure;
     if (!run->dense_ready && run->rejected) return SYMDYN_BAD_OUTPUT_TIME;  // stages are those of an attempt from t
     if ((failure = symdyn_between(run, s, x))) return failure;
@@ -746,7 +757,7 @@ static double symdyn_first_step(symdyn_run *run) {
 }
 
 // Go on from (t, x), projected, as at a start. h_first: length of the first step, 0: chosen. Returns 0 or a failure.
-static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_first) {
+static int symdyn_restart(symdyn_run *run, symdyn_time t, const double *x, double h_first) {
     run->t = run->t_old = t;
     run->t_low = 0.0;
     run->root_old = 0.316;
@@ -764,10 +775,11 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
-    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    void *memory, const symdyn_problem *problem, const symdyn_time *span, const double *x0, const double *atol) {
     symdyn_run *const run = (symdyn_run *)memory;
-    const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
-    const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
+    const symdyn_time t0 = span[0], t_end = span[1];
+    const double rtol = (double)span[2], h_first = (double)span[3], h_max = (double)span[4];
+    const symdyn_time length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const symdyn_run empty = {0};
     int bad = !(length <= symdyn_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
     *run = empty;
@@ -775,7 +787,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
     run->t = run->t_old = t0;
     run->t_end = t_end;
     run->direction = t_end > t0 ? 1.0 : t_end < t0 ? -1.0 : 0.0;
-    run->t_slack = 8.0 * symdyn_eps * far;
+    run->t_slack = 8.0 * symdyn_time_eps * far;
     run->h_floor = symdyn_eps * symdyn_eps * length;
     run->h_max = h_max > 0.0 ? h_max : length;
     run->rtol = rtol;
@@ -792,13 +804,13 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
 // Control of the steps: the length of the next one, and what becomes of one that was tried.
 
 // Where the next step has to end at the latest: at a kink of the inputs ahead, or with the run.
-static double symdyn_bound(const symdyn_run *run) {
+static symdyn_time symdyn_bound(const symdyn_run *run) {
     return run->t_end;
 }
 
 // The step to be tried next.
 static void symdyn_propose(symdyn_run *run) {
-    const double bound = symdyn_bound(run);
+    const symdyn_time bound = symdyn_bound(run);
     const double rest = fabs((bound - run->t) - run->t_low), least = 16.0 * symdyn_eps * fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;
@@ -809,9 +821,9 @@ static void symdyn_propose(symdyn_run *run) {
     run->t_new_low = 0.0;
     run->crossing = 0;
     if (last) return;
-    const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
+    const symdyn_time way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
     run->t_new = run->t + way;
-    const double back = run->t_new - run->t;
+    const symdyn_time back = run->t_new - run->t;
     run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
@@ -864,10 +876,10 @@ __attribute__((noinline)) static void symdyn_attempt(symdyn_run *run) {
 }
 
 // Write the requested times that are passed by now; returns 0 or a failure.
-static int symdyn_serve(symdyn_run *run, const double *t_out, long n_out, double *x_out, long *n_written) {
+static int symdyn_serve(symdyn_run *run, const symdyn_time *t_out, long n_out, double *x_out, long *n_written) {
     for (; *n_written < n_out; ++*n_written) {
-        const double s = t_out[*n_written];
-        const double ahead = (s - run->t) * run->direction, behind = (run->t_old - s) * run->direction;
+        const symdyn_time s = t_out[*n_written];
+        const symdyn_time ahead = (s - run->t) * run->direction, behind = (run->t_old - s) * run->direction;
         double *restrict const x = x_out + *n_written * SYMDYN_NX;
         if (!((run->direction == 0.0 ? fabs(s - run->t) : ahead) <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;
         if (behind > run->t_slack) return SYMDYN_BAD_OUTPUT_TIME;
@@ -888,7 +900,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // direction of integration, to the rows of x[n][SYMDYN_NX] as they are passed; times beyond t_end never are. With `every`, append
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
-    void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
+    void *memory, int every, long max_steps, symdyn_time *t, long n, double *x, long *written) {
     symdyn_run *const run = (symdyn_run *)memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
@@ -910,7 +922,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
     const symdyn_run *const run = (const symdyn_run *)memory;
     const symdyn_report now = {
         .status = run->status,
-        .t = run->t,
+        .t = (double)run->t,
         .h = run->h,
         .n_steps = run->n_steps,
         .n_rejected = run->n_rejected,

@@ -16,6 +16,7 @@ from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows, together
 from symdyn.runtime.batches.on_device import on_device
+from symdyn.runtime.batches.precision import checked_precision
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
 from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
@@ -54,10 +55,11 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
                    first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
                    events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
                    extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True,
-                   device: Any = "cpu") -> BatchSolution:
+                   device: Any = "cpu", precision: Any = "double") -> BatchSolution:
     """See Module.simulate_batch."""
     metadata = module.metadata
     gpu = device_number(device, module.name)
+    precision = checked_precision(precision, gpu is not None, module.name)
     checked_method(module, method)
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
@@ -102,7 +104,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
 
         method_or_default = options.get("method", METHOD)
         solution = _on_vectors(module, asked, method_or_default, alone) if gpu is None else on_device(
-            module, asked, gpu, options, alone)
+            module, asked, gpu, options, alone, precision)
         if along is not None and along.pieces is not None and given.ndim == 3:
             given[:] = along.pieces.at(times)
     return _warned(module, asked, solution, given)

@@ -10,6 +10,7 @@ import numpy as np
 from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import ArgumentError
+from symdyn.runtime.batches.precision import LEAST_RTOL
 from symdyn.runtime.batches.solution import BatchSolution
 from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states_on_device import device_kernel
@@ -18,6 +19,7 @@ from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.gpu.motions import MOST_STEPS, Work, integrate
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.methods import unfit
+from symdyn.runtime.integrating.run_record import SingleReport
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, Any],
-              alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
+              alone: Callable[[np.ndarray], BatchSolution], precision: str) -> BatchSolution:
     """Motions on the GPU with this number.
 
     options    of `simulate`, those that differ from the defaults
@@ -34,22 +36,60 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
     """
     method = options.get("method", METHOD)
     demand_fit(module, method, asked.along, options)
+    if precision == "single":
+        _demand_single(module, method, asked)
     device = devices.open_device(number, module.name)
     try:
-        unit: Any = module.unit(RightSide(method=method, threads=True, looks=asked.looks))
+        unit: Any = module.unit(RightSide(method=method, threads=True, looks=asked.looks,
+                                             single=precision == "single"))
         kernel = device_kernel(module, device, unit.source, f"{unit.metadata.name}_motions")
         motions = Together(module, asked)
         work = Work(motions.starts, asked.inputs, motions.params, motions.lengths, motions.span, asked.atol, asked.times,
                     projects(module), motions.pieces, motions.stops, motions.look, asked.event_spacing, motions.taken_after,
-                    motions.x, motions.states, motions.reports, motions.doubts)
+                    *_results(motions, precision), motions.doubts)
         interrupted, note = False, ""
         try:
             note = integrate(device, kernel, work, module.name)
         except KeyboardInterrupt:
             interrupted = True
+        _take(motions, work)
         return motions.solution(unit, device.at_once(kernel), note, interrupted, MOST_STEPS, alone)
     finally:
         device.close()
+
+
+def _results(motions: Together, precision: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where states at output times, states of reports, and reports go."""
+    if precision == "double":
+        return motions.x, motions.states, motions.reports
+    reports = np.zeros(len(motions.reports), dtype=np.dtype(SingleReport))
+    reports["status"] = motions.reports["status"]
+    return np.full(motions.x.shape, np.nan, np.float32), np.full(motions.states.shape, np.nan, np.float32), reports
+
+
+def _take(motions: Together, work: Work) -> None:
+    """Results in single precision as doubles."""
+    if work.x is not motions.x:
+        motions.x[:], motions.states[:] = work.x, work.states
+        for name in motions.reports.dtype.names or ():
+            motions.reports[name] = work.reports[name]
+
+
+def _demand_single(module: Module, method: str, asked: Asked) -> None:
+    """Raises ArgumentError with all that needs double precision."""
+    faults = []
+    if METHODS[method].tableau is None:
+        explicit = " or ".join(repr(name) for name, one in METHODS.items() if one.tableau is not None)
+        faults.append(f"method={method!r}, whose equations are solved to rounding; pass {explicit}")
+    if module.metadata.constraints:
+        faults.append(f"the constraints {', '.join(module.metadata.constraints)}, which are kept to 1e-12")
+    if asked.looks:
+        faults.append("events, whose times are found to rounding; pass events=False where they do not matter")
+    if asked.rtol < LEAST_RTOL:
+        faults.append(f"rtol={asked.rtol:g}; pass {LEAST_RTOL:g} or more")
+    if faults:
+        raise ArgumentError(f"{module.name}: precision='single' does not take {'; '.join(faults)}. Leave precision out for "
+                            "doubles")
 
 
 def demand_fit(module: Module, method: Any, along: Inputs | None, options: Mapping[str, Any]) -> None:

@@ -84,8 +84,8 @@ def _there(module: Module, device: Device, kernels: Kernels, unit: Any, values: 
 def _kernels(module: Module, device: Device, precision: str) -> tuple[Kernels, Any]:
     unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
     own, metadata = unit.metadata.name, unit.metadata
-    kernels = [device_kernel(module, device, unit.source, f"{own}_{function}") for function in ("constants", "states")]
-    return Kernels(*kernels, np.dtype(PRECISIONS[precision]), metadata.sizes.x, metadata.n_c), unit
+    constants, states = (device_kernel(module, device, unit.source, f"{own}_{what}") for what in ("constants", "states"))
+    return Kernels(constants, states, np.dtype(PRECISIONS[precision]), metadata.sizes.x, metadata.n_c), unit
 
 
 def device_kernel(module: Module, device: Device, text: str, function: str) -> Any:

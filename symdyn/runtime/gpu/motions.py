@@ -42,6 +42,7 @@ class Work:
     pieces, stops   inputs over time, and instants that steps end at
     look, event_spacing, taken_after   events to look for, (n_e,) of integers, empty: none; samples of them; steps between takes
     x, states, reports, doubts   results of n motions
+    Numbers of the device are of the type of x, but for times.
     """
 
     starts: np.ndarray
@@ -63,6 +64,11 @@ class Work:
     doubts: np.ndarray
 
     @property
+    def dtype(self) -> np.dtype:
+        """The type of numbers on the device."""
+        return self.x.dtype
+
+    @property
     def given(self) -> tuple[np.ndarray, ...]:
         """In the order of the kernel."""
         return self.starts, self.inputs, self.params, self.lengths
@@ -74,7 +80,7 @@ class Work:
 
     def bytes_each(self) -> int:
         """What one motion takes of the device's memory."""
-        varying = sum(a.shape[1] * a.itemsize for a in self.given if len(a) > 1)
+        varying = sum(a.shape[1] * self.dtype.itemsize for a in self.given if len(a) > 1)
         return varying + sum(a[:1].nbytes for a in self.results)
 
 
@@ -99,9 +105,9 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     for; chunks that were not begun keep their results as they were.
     """
     n, threads = len(work.x), device.at_once(kernel)
-    fixed = [np.ascontiguousarray(a, dtype=float) for a in (
-        work.span, work.atol, work.times, work.stops,
-        *((work.pieces.breaks, work.pieces.coefficients) if work.pieces is not None else (np.zeros(0), np.zeros(0))))]
+    times = [np.ascontiguousarray(a, dtype=float) for a in (work.span, work.times)]
+    pieces = (np.zeros(0), np.zeros(0)) if work.pieces is None else (work.pieces.breaks, work.pieces.coefficients)
+    fixed = [*times, *(np.ascontiguousarray(a, dtype=work.dtype) for a in (work.atol, work.stops, *pieces))]
     fixed.append(np.ascontiguousarray(work.look, dtype=np.intc))
     # One row for all is copied once a slot.
     around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
@@ -120,7 +126,7 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
 
     try:
         places = [allocated(a.nbytes) for a in fixed]
-        slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * a.itemsize) for a in work.given],
+        slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * work.dtype.itemsize) for a in work.given],
                        [allocated(size * a[:1].nbytes) for a in work.results],
                        allocated(len(work.given) * ctypes.sizeof(Table)), allocated(ctypes.sizeof(ctypes.c_int)))
                  for _ in range(min(SLOTS, -(-n // size)))]
@@ -140,7 +146,7 @@ def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[in
     tables = (Table * len(work.given))()
     slot.kept = []
     for k, (values, address) in enumerate(zip(work.given, slot.given, strict=True)):
-        mine = np.ascontiguousarray(values[part] if len(values) > 1 else values, dtype=float)
+        mine = np.ascontiguousarray(values[part] if len(values) > 1 else values, dtype=work.dtype)
         tables[k] = Table(address, mine.shape[1] if len(values) > 1 else 0, 1)
         device.upload(slot.stream, address, mine)
         slot.kept.append(mine)
@@ -148,7 +154,7 @@ def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[in
     for values, address in ((headers, slot.tables), (np.zeros(1, dtype=np.intc), slot.counter)):
         device.upload(slot.stream, address, values)
         slot.kept.append(values)
-    span, atol, times, stops, breaks, coefficients, look = places
+    span, times, atol, stops, breaks, coefficients, look = places
     argument = Motions(
         n=n, n_out=len(work.times), max_steps=MOST_STEPS, given=slot.tables, span=span, atol=atol, t_out=times,
         n_pieces=0 if work.pieces is None else len(work.pieces.coefficients), breaks=breaks, pieces=coefficients,

@@ -43,6 +43,12 @@ class RunReport(ctypes.Structure):
     t_rough: float
 
 
+class SingleReport(ctypes.Structure):
+    """The same from code in single precision."""
+
+    _fields_ = [(name, ctypes.c_float if kind is ctypes.c_double else kind) for name, kind in RunReport._fields_]
+
+
 class Report(NamedTuple):
     """A report, with the present state (n_x,) and the one where an evaluation failed (n_x,)."""
 

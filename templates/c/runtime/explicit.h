@@ -3,6 +3,17 @@
 
 #include "explicit_stage.h"
 
+#if SYMDYN_SINGLE
+// Entry i of the state, moved by a change; what rounding cuts off is kept, so that it does not build up over steps.
+static inline double symdyn_moved(symdyn_run *run, int i, double change) {
+    const double way = change + run->x_low[i], end = run->x[i] + way, back = end - run->x[i];
+    run->x_new_low[i] = (run->x[i] - (end - back)) + (way - back);
+    return end;
+}
+#else
+#define symdyn_moved(run, i, change) ((run)->x[i] + (change))
+#endif
+
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
 SYMDYN_LINKED int symdyn_try(
     symdyn_run *run, double h, double t_new, double *restrict x_new, double *restrict xd_new, double *restrict err) {
@@ -13,7 +24,7 @@ SYMDYN_LINKED int symdyn_try(
     for (int i = 0; i < SYMDYN_NX; i++) k[0][i] = run->xd[i];
     SYMDYN_EACH_STAGE(SYMDYN_STAGE)
 #if SYMDYN_SLOPE_AT_END
-    for (int i = 0; i < SYMDYN_NX; i++) x_new[i] = x[i] + h * (SYMDYN_B(k, i));
+    for (int i = 0; i < SYMDYN_NX; i++) x_new[i] = symdyn_moved(run, i, h * (SYMDYN_B(k, i)));
     if ((failure = symdyn_eval(run, t_new, x_new, xd_new))) return failure;
     for (int i = 0; i < SYMDYN_NX; i++) k[SYMDYN_STAGES][i] = xd_new[i];
 #endif
@@ -22,7 +33,7 @@ SYMDYN_LINKED int symdyn_try(
 #if SYMDYN_SECOND_ERROR
         const double slope = SYMDYN_B(k, i);
         const double e2 = SYMDYN_SECOND(k, i, slope);
-        x_new[i] = x[i] + h * slope;
+        x_new[i] = symdyn_moved(run, i, h * slope);
 #endif
         const double scale = symdyn_scale(run, i, x_new[i]);
         sum += (e * scale) * (e * scale);
@@ -36,7 +47,7 @@ SYMDYN_LINKED int symdyn_try(
 }
 
 // See explicit_again.h.
-SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err);
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err);
 SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run);
 
 // Row j of the dense output.
@@ -79,7 +90,7 @@ static int symdyn_prepare_dense(symdyn_run *run) {
 }
 
 // The state at s within the latest step.
-SYMDYN_LINKED int symdyn_between(symdyn_run *run, double s, double *x_out) {
+SYMDYN_LINKED int symdyn_between(symdyn_run *run, symdyn_time s, double *x_out) {
     const double theta = (s - run->t_old) / run->h_old, rest = 1.0 - theta;
     int failure;
     if (!run->dense_ready && (failure = symdyn_prepare_dense(run))) return failure;

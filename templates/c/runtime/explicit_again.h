@@ -44,7 +44,7 @@ static int symdyn_cross(symdyn_run *run, const double *x_new, double *err) {
 #endif
 
 // The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
-SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err) {
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err) {
     symdyn_run again = *run;
     double xd[SYMDYN_NX];
     again.t = from_end ? run->t : run->t_old;

@@ -3,20 +3,22 @@
 
 #include "report_type.h"
 #include "table_type.h"
+#include "time_type.h"
 
 typedef struct {
-    long n, n_out, max_steps;           // trajectories; output times; attempted steps of one trajectory, at most
-    const symdyn_table *given;          // states, inputs, parameters, lengths that residuals are measured by, m
-    const double *span, *atol, *t_out;  // t0, t_end, rtol, first step, largest step; of every state; output times
-    long n_pieces;                      // of inputs over time, see problem_type.h
+    long n, n_out, max_steps;         // trajectories; output times; attempted steps of one trajectory, at most
+    const symdyn_table *given;        // states, inputs, parameters, lengths that residuals are measured by, m
+    const symdyn_time *span, *t_out;  // t0, t_end, rtol, first step, largest step; output times
+    const double *atol;               // of every state
+    long n_pieces;                    // of inputs over time, see problem_type.h
     const double *breaks, *pieces;
     long n_stops;
     const double *stops;
-    int project;              // see problem_type.h
-    const int *look;          // which events to look for; 0: none
-    double event_spacing;     // of samples of their quantities at the most, s; 0: any
-    long events_taken_after;  // attempted steps, as a caller of one run takes them
-    double *x_out, *states;   // states at the output times; two states of every report
+    int project;                // see problem_type.h
+    const int *look;            // which events to look for; 0: none
+    symdyn_time event_spacing;  // of samples of their quantities at the most, s; 0: any
+    long events_taken_after;    // attempted steps, as a caller of one run takes them
+    double *x_out, *states;     // states at the output times; two states of every report
     symdyn_report *reports;
     int *doubts;  // of every trajectory, see dropped_events.h
     int *next;    // the first trajectory that no thread has taken

@@ -5,21 +5,29 @@
 #include "problem.h"
 #include "report_type.h"
 #include "status.h"
+#include "time_type.h"
 
 typedef struct {
     symdyn_problem problem;
-    double t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
-    double t_end, direction;  // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
-    double t_slack, h_floor;  // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
-    double h, h_max;          // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
-    double h_try, h_min, t_new, t_new_low;  // the step that is tried: its length with sign, the shortest one, its end
-    double h_cut;                           // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
-    double rtol, atol[SYMDYN_NX];           // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
-    double root_old;                        // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
-    double x[SYMDYN_NX], xd[SYMDYN_NX];     // state at t and its derivative
-    double t_old, h_old, x_old[SYMDYN_NX];  // start of the latest accepted step, its length, with sign, the state there
-    int dense_ready, unstored;              // what is needed within the latest step is prepared; (t, x) is not stored yet
-    int rejected, status;                   // the latest attempt was rejected: do not lengthen the step
+    symdyn_time t, t_low;  // present time, and what rounding has cut off it: the time is t + t_low
+    symdyn_time t_end;     // where the run ends, hit exactly
+    double direction;      // sign of t_end - t0 (0 if they are equal)
+    symdyn_time t_slack,
+        h_floor;          // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
+    double h, h_max;      // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min;  // the step that is tried: its length with sign, the shortest one,
+    symdyn_time t_new, t_new_low;        // its end
+    double h_cut;                        // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
+    double rtol, atol[SYMDYN_NX];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;                     // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
+    double x[SYMDYN_NX], xd[SYMDYN_NX];  // state at t and its derivative
+#if SYMDYN_SINGLE
+    double x_low[SYMDYN_NX], x_new_low[SYMDYN_NX];  // what rounding has cut off x, and off the end of the step that is tried
+#endif
+    symdyn_time t_old;                        // start of the latest accepted step,
+    double h_old, x_old[SYMDYN_NX];           // its length, with sign, the state there
+    int dense_ready, unstored;                // what is needed within the latest step is prepared; (t, x) is not stored yet
+    int rejected, status;                     // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
     // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
     // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
@@ -44,7 +52,12 @@ typedef struct {
 #endif
 } symdyn_run;
 
-static const double symdyn_eps = 2.220446049250313e-16, symdyn_huge = 1.7976931348623157e308;
+#if SYMDYN_SINGLE
+static const double symdyn_eps = 1.1920929e-7, symdyn_huge = 3.4028234e38, symdyn_tiny = 1e-30;
+#else
+static const double symdyn_eps = 2.220446049250313e-16, symdyn_huge = 1.7976931348623157e308, symdyn_tiny = 1e-300;
+#endif
+static const symdyn_time symdyn_time_eps = 2.220446049250313e-16;
 
 // Record a failure; returns its status.
 static int symdyn_fail(symdyn_run *run, int status, int reason, long bad_index, double t, const double *x) {
@@ -70,7 +83,7 @@ static int symdyn_eval(symdyn_run *run, double t, const double *y, double *xd) {
 // One over the tolerated error of state i in a step from run->x to x_new; finite also for x = 0 without atol.
 static inline double symdyn_scale(const symdyn_run *run, int i, double x_new) {
     const double size = fabs(run->x[i]) > fabs(x_new) ? fabs(run->x[i]) : fabs(x_new);
-    return 1.0 / (run->atol[i] + run->rtol * size + 1e-300);
+    return 1.0 / (run->atol[i] + run->rtol * size + symdyn_tiny);
 }
 
 // The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, does not count.

@@ -37,10 +37,10 @@ __attribute__((noinline)) static void symdyn_attempt(symdyn_run *run) {
 }
 
 // Write the requested times that are passed by now; returns 0 or a failure.
-static int symdyn_serve(symdyn_run *run, const double *t_out, long n_out, double *x_out, long *n_written) {
+static int symdyn_serve(symdyn_run *run, const symdyn_time *t_out, long n_out, double *x_out, long *n_written) {
     for (; *n_written < n_out; ++*n_written) {
-        const double s = t_out[*n_written];
-        const double ahead = (s - run->t) * run->direction, behind = (run->t_old - s) * run->direction;
+        const symdyn_time s = t_out[*n_written];
+        const symdyn_time ahead = (s - run->t) * run->direction, behind = (run->t_old - s) * run->direction;
         double *restrict const x = x_out + *n_written * SYMDYN_NX;
         if (!((run->direction == 0.0 ? fabs(s - run->t) : ahead) <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;
         if (behind > run->t_slack) return SYMDYN_BAD_OUTPUT_TIME;
@@ -61,7 +61,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // direction of integration, to the rows of x[n][SYMDYN_NX] as they are passed; times beyond t_end never are. With `every`, append
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
-    void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
+    void *memory, int every, long max_steps, symdyn_time *t, long n, double *x, long *written) {
     symdyn_run *const run = (symdyn_run *)memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
@@ -83,7 +83,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
     const symdyn_run *const run = (const symdyn_run *)memory;
     const symdyn_report now = {
         .status = run->status,
-        .t = run->t,
+        .t = (double)run->t,
         .h = run->h,
         .n_steps = run->n_steps,
         .n_rejected = run->n_rejected,

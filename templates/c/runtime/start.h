@@ -6,7 +6,7 @@
 #if SYMDYN_CROSSES
 // The state at s within the latest step, by a step of its own from its start or its end, of which only one goes across the
 // singular configuration: by that of the smaller error. Across it polynomials swing, and a stage may lie too near.
-static int symdyn_within(symdyn_run *run, double s, double *x) {
+static int symdyn_within(symdyn_run *run, symdyn_time s, double *x) {
     double y[2][SYMDYN_NX], err[2];
     int failure[2];
     for (int back = 0; back < 2; back++) failure[back] = symdyn_by_a_step(run, back, s, y[back], err + back);
@@ -17,7 +17,7 @@ static int symdyn_within(symdyn_run *run, double s, double *x) {
 #endif
 
 // The state at s within the latest step, on the constraints. Returns 0 or a failure.
-static int symdyn_state_at(symdyn_run *run, double s, double *x) {
+static int symdyn_state_at(symdyn_run *run, symdyn_time s, double *x) {
     int failure;
 #if SYMDYN_CROSSES
     if (run->crossed && !run->rejected) return symdyn_within(run, s, x);
@@ -55,13 +55,16 @@ static double symdyn_first_step(symdyn_run *run) {
 #endif
 
 // Go on from (t, x), projected, as at a start. h_first: length of the first step, 0: chosen. Returns 0 or a failure.
-static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_first) {
+static int symdyn_restart(symdyn_run *run, symdyn_time t, const double *x, double h_first) {
     run->t = run->t_old = t;
     run->t_low = 0.0;
     run->root_old = 0.316;
     run->unstored = 1;
     run->dense_ready = run->rejected = 0;
     for (int i = 0; i < SYMDYN_NX; i++) run->x[i] = x[i];
+#if SYMDYN_SINGLE
+    for (int i = 0; i < SYMDYN_NX; i++) run->x_low[i] = 0.0;
+#endif
 #if SYMDYN_PROJECTS
     if (run->problem.project && (run->status = symdyn_correct(run, t, run->x))) return run->status;
 #endif
@@ -83,10 +86,11 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
-    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    void *memory, const symdyn_problem *problem, const symdyn_time *span, const double *x0, const double *atol) {
     symdyn_run *const run = (symdyn_run *)memory;
-    const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
-    const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
+    const symdyn_time t0 = span[0], t_end = span[1];
+    const double rtol = (double)span[2], h_first = (double)span[3], h_max = (double)span[4];
+    const symdyn_time length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const symdyn_run empty = {0};
     int bad = !(length <= symdyn_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
     *run = empty;
@@ -94,7 +98,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
     run->t = run->t_old = t0;
     run->t_end = t_end;
     run->direction = t_end > t0 ? 1.0 : t_end < t0 ? -1.0 : 0.0;
-    run->t_slack = 8.0 * symdyn_eps * far;
+    run->t_slack = 8.0 * symdyn_time_eps * far;
     run->h_floor = symdyn_eps * symdyn_eps * length;
     run->h_max = h_max > 0.0 ? h_max : length;
     run->rtol = rtol;

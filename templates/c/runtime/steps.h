@@ -4,10 +4,10 @@
 #include "run.h"
 
 // Where the next step has to end at the latest: at a kink of the inputs ahead, or with the run.
-static double symdyn_bound(const symdyn_run *run) {
+static symdyn_time symdyn_bound(const symdyn_run *run) {
 #if SYMDYN_HAS_INPUTS
     const symdyn_problem *const problem = &run->problem;
-    const double here = run->t + run->direction * run->t_slack;
+    const symdyn_time here = run->t + run->direction * run->t_slack;
     long low = 0, high = problem->n_stops;
     while (low < high) {
         const long middle = low + (high - low) / 2;
@@ -25,7 +25,7 @@ static double symdyn_bound(const symdyn_run *run) {
 
 // The step to be tried next.
 static void symdyn_propose(symdyn_run *run) {
-    const double bound = symdyn_bound(run);
+    const symdyn_time bound = symdyn_bound(run);
     const double rest = fabs((bound - run->t) - run->t_low), least = 16.0 * symdyn_eps * fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;
@@ -39,9 +39,9 @@ static void symdyn_propose(symdyn_run *run) {
     run->h_cut = h > fabs(run->h_try) ? h : 0.0;
 #endif
     if (last) return;
-    const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
+    const symdyn_time way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
     run->t_new = run->t + way;
-    const double back = run->t_new - run->t;
+    const symdyn_time back = run->t_new - run->t;
     run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
@@ -76,6 +76,9 @@ static void symdyn_judge(symdyn_run *run, int failure, double err, double root, 
         run->x_old[i] = run->x[i];
         run->x[i] = x_new[i];
         run->xd[i] = xd_new[i];
+#if SYMDYN_SINGLE
+        run->x_low[i] = run->x_new_low[i];
+#endif
     }
     run->n_steps++;
     run->unstored = 1;
