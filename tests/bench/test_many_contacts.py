@@ -24,6 +24,18 @@ def test_balls_fall_into_a_box_and_keep_the_laws_of_contact() -> None:
     assert many_contacts.missed(solution).max() > 1e-4
 
 
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("n", [20, 40])
+def test_laws_hold_along_the_normals_at_the_end_of_a_step(n: int) -> None:
+    """More balls than are solved to rounding, in two rounds of a step only: the residual that is reported is that of the laws."""
+    system, start = many_contacts.box(n)
+    solution = system.compile().simulate((0, 0.3), q=start, method="moreau", step=many_contacts.STEP)
+    stepped = solution.stepped
+    assert stepped is not None and len(stepped.touched.a) > 100
+    assert many_contacts.missed(solution).max() < 1e-6 and stepped.residual < 1e-6
+    assert many_contacts.deepest(solution, n) < 1e-6
+
+
 def test_numbers_of_balls_are_checked() -> None:
     for numbers in ("0", "3,x", ""):
         with pytest.raises(ArgumentError, match="pass numbers such as '30,60'"):

@@ -51,7 +51,7 @@ ACCEPTED = 1e-6
 FEW = 12
 GROUP_DENSE = 240
 GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 5e-7, 1e-7, 1.0
-GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 200, 2, 2
+GROUP_SWEEPS, GROUP_ROUGH, GROUP_ROUNDS, GROUP_PASSES = 200, 30, 2, 4
 # Residuals above this many tolerances are reported.
 REPORTED = 1e3
 
@@ -283,10 +283,11 @@ class Stepper:
         memory.take(record, "unit_first", np.cumsum([0, *map(len, metadata.unit_groups)]).astype(places))
         memory.take(record, "unit_index",
                     np.array([*(place[q] for group in metadata.unit_groups for q in group), 0], dtype=places))
-        memory.put(record, places, **dict.fromkeys(("a", "b", "was_a", "was_b", "sum_a", "sum_b", "old_a", "old_b"), most),
-                   old_from=record.n_bodies + 1)
+        listed = ("a", "b", "was_a", "was_b", "was_at", "sum_a", "sum_b", "old_a", "old_b")
+        memory.put(record, places, **dict.fromkeys(listed, most), old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
-        memory.put(record, float, work=8 * n_x, P_old=3 * most, basis=9 * most, incoming=3 * most, at_end=4 * most)
+        memory.put(record, float, work=8 * n_x, at_end=4 * most, basis=9 * most,
+                   **dict.fromkeys(("P_old", "P_guess", "incoming"), 3 * most))
         record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
         record.length = request.stabilization.length or 1.0
@@ -294,6 +295,7 @@ class Stepper:
         record.accepted = ACCEPTED
         if many:
             record.tolerance, record.depth, record.accepted = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED
+            record.rough_sweeps = GROUP_ROUGH
             record.most_sweeps, record.most_rounds, record.most_passes = GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES
 
     def _frames(self, n_x: int, n_in: int) -> None:

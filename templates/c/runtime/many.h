@@ -159,36 +159,39 @@ static double symdyn_pair_speed(const symdyn_moreau *s, long a, long b, const do
     return sum;
 }
 
-// The columns of m rows that belong to one of the bodies of a pair, which touches along the normal. Returns the place behind
-// them.
-static long symdyn_pair_columns(
-    const symdyn_moreau *s, symdyn_cones *c, long e, long body, const double *basis, double arm, double sign, int m) {
+// Wrenches of m rows of a pair on one of its bodies, times a 6 x n_speeds matrix of that body: three numbers to a column.
+static void symdyn_pair_product(
+    const symdyn_moreau *s, const double *matrix, const double *basis, double arm, double sign, int m, double *product) {
     const int n = s->n_speeds;
-    const double *B = symdyn_sphere(s, body) + 10, *T = s->response + 6 * n * body;
     double six[18] = {0.0};
     for (int k = 0; k < m; k++) symdyn_wrench(basis, arm, basis + 3 * k, six + 6 * k);
-    for (int i = 0; i < n; i++) {
-        double any = 0.0;
+    for (int i = 0; i < n; i++)
         for (int k = 0; k < 3; k++) {
-            double along = 0.0, answer = 0.0;
-            for (int l = 0; l < 6; l++) {
-                along += six[6 * k + l] * B[n * l + i];
-                answer += six[6 * k + l] * T[n * l + i];
-            }
-            c->along[3 * e + k] = sign * along;
-            c->answer[3 * e + k] = sign * answer;
-            any += fabs(along) + fabs(answer);
+            double sum = 0.0;
+            for (int l = 0; l < 6; l++) sum += six[6 * k + l] * matrix[n * l + i];
+            product[3 * i + k] = sign * sum;
         }
-        c->speed[e] = (int)s->speed_of[n * body + i];
-        if (any > 0.0) e++;
-    }
-    return e;
+}
+
+// J of a pair at what the frames looked at last, along a basis, behind the columns e; they are as many as n_speeds of each body.
+static void symdyn_pair_along(const symdyn_moreau *s, symdyn_cones *c, long e, long a, long b, const double *basis, int m) {
+    const double *one = symdyn_sphere(s, a);
+    symdyn_pair_product(s, one + 10, basis, -one[0], 1.0, m, c->along + 3 * e);
+    if (b >= s->n_bodies) return;
+    symdyn_pair_product(s, symdyn_sphere(s, b) + 10, basis, symdyn_arm(s, a, b), -1.0, m, c->along + 3 * (e + s->n_speeds));
 }
 
 // Append the rows of a pair, along the normal alone or with its tangents.
 static void symdyn_pair_rows(const symdyn_moreau *s, symdyn_cones *c, long a, long b, const double *basis, int m) {
-    long e = symdyn_pair_columns(s, c, c->entry[c->n], a, basis, -symdyn_sphere(s, a)[0], 1.0, m);
-    if (b < s->n_bodies) e = symdyn_pair_columns(s, c, e, b, basis, symdyn_arm(s, a, b), -1.0, m);
+    const int n = s->n_speeds, two = b < s->n_bodies;
+    const long e = c->entry[c->n];
+    symdyn_pair_along(s, c, e, a, b, basis, m);
+    symdyn_pair_product(s, s->response + 6 * n * a, basis, -symdyn_sphere(s, a)[0], 1.0, m, c->answer + 3 * e);
+    if (two) symdyn_pair_product(s, s->response + 6 * n * b, basis, symdyn_arm(s, a, b), -1.0, m, c->answer + 3 * (e + n));
+    for (int i = 0; i < n; i++) {
+        c->speed[e + i] = (int)s->speed_of[n * a + i];
+        if (two) c->speed[e + n + i] = (int)s->speed_of[n * b + i];
+    }
     c->first[c->n + 1] = c->first[c->n] + m;
-    c->entry[++c->n] = e;
+    c->entry[++c->n] = e + (two ? 2 * n : n);
 }

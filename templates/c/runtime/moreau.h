@@ -233,7 +233,8 @@ static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c, double h) {
         const long old = symdyn_earlier(s, i), r = c->first[i];
         const double *mu = symdyn_coefficients(s, i);
         const int stuck = old < 0 || !s->old_state[old] ? symdyn_still(s, c, i) : s->old_state[old] == SYMDYN_STICKING;
-        for (long k = r; k < c->first[i + 1]; k++) c->P[k] = old < 0 ? 0.0 : s->P_old[3 * old + k - r];
+        const double *P = s->was_at[i] >= 0 ? s->P_guess + 3 * s->was_at[i] : old >= 0 ? s->P_old + 3 * old : 0;
+        for (long k = r; k < c->first[i + 1]; k++) c->P[k] = P ? P[k - r] : 0.0;
         s->broken[i] = !stuck || !(mu[0] > mu[1]);
         c->friction[i] = symdyn_bound(s, i, stuck, h);
     }
@@ -247,10 +248,10 @@ static int symdyn_slips(const symdyn_moreau *s, const symdyn_cones *c, long i) {
     return c->state[i] == SYMDYN_SLIDING && sqrt(square) > s->tolerance;
 }
 
-// Solve for the impulses; contacts that stuck and slip now have kinetic friction.
-static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h) {
+// Solve for the impulses, in so many sweeps; contacts that stuck and slip now have kinetic friction.
+static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, long most_sweeps) {
     for (int again = 1; again;) {
-        symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
+        symdyn_cones_solve(c, s->tolerance, most_sweeps);
         again = 0;
         for (long i = 0; i < c->n; i++)
             if (!s->broken[i] && symdyn_slips(s, c, i)) {
@@ -260,11 +261,12 @@ static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h) {
     }
 }
 
-// Iterate on the end of a step, from a first guess in end. Returns 0 or a failure.
-static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end) {
+// Iterate on the end of a step, from a first guess in end: once if a rough solution does. Impulses of pairs act along the
+// normals in the middle, their laws hold along those at the end. Returns 0 or a failure.
+static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end, int rough) {
     double *middle = s->work, *next = s->work + s->n_x, *kick = s->work + 2 * s->n_x, off = 0.0;
     const int n_q = s->n_q, n_u = s->n_u;
-    const int most = s->n_found ? s->most_rounds : 60;
+    const int most = rough ? 1 : s->n_found ? s->most_rounds : 60;
     const double accepted = s->n_found ? s->accepted : 1e-6;
     for (int round = 0; round < most; round++) {
         int failed;
@@ -291,11 +293,12 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
                 const long r = c->first[i], m = c->first[i + 1] - r;
                 for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
                 symdyn_contact_now(s, i, m, basis, w);
+                if (s->b[i] >= 0) symdyn_pair_along(s, c, c->entry[i], s->a[i], s->b[i], basis, (int)m);
                 symdyn_cones_along(c, i, kick, kicked);
                 for (long k = 0; k < m; k++) c->free[r + k] = w[k] - kicked[k];
                 if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
             }
-            symdyn_impulses(s, c, h);
+            symdyn_impulses(s, c, h, s->rough_sweeps && (rough || round + 1 < most) ? s->rough_sweeps : s->most_sweeps);
             for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
         }
         const double last = off;
@@ -311,7 +314,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
         const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
         const int nearer = off < 0.25 * last && off > 1e-15 * size;  // beyond what is noise in general
         if (round && off <= noise && !nearer) return 0;
-        if (round + 1 == most && off > accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
+        if (!rough && round + 1 == most && off > accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
     }
     return 0;
 }
@@ -352,6 +355,8 @@ static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
     for (long i = 0; i < n_was; i++) {
         s->was_a[i] = s->a[i];
         s->was_b[i] = s->b[i];
+        for (long k = 0; k < 3 && c->n == n_was; k++)
+            s->P_guess[3 * i + k] = c->first[i] + k < c->first[i + 1] ? c->P[c->first[i] + k] : 0.0;
     }
     const int failed = symdyn_find(s, c, s->depth, 1);
     if (failed) return failed;
@@ -362,6 +367,7 @@ static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
         const long now = one < two ? one : two, begin = i;
         for (; symdyn_order(s, s->was_a, s->was_b, i, n_was) == now && i < n_was; i++) {
             if (n >= c->most) return SYMDYN_MOREAU_ROOM;
+            s->was_at[n] = c->n == n_was ? i : -1;
             s->sum_a[n] = s->was_a[i];
             s->sum_b[n++] = s->was_b[i];
         }
@@ -371,6 +377,7 @@ static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
             if (there) continue;
             if (n >= c->most) return SYMDYN_MOREAU_ROOM;
             *added = 1;
+            s->was_at[n] = -1;
             s->sum_a[n] = s->a[j];
             s->sum_b[n++] = s->b[j];
         }
@@ -408,11 +415,11 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     failed = symdyn_rate(s, t + 0.5 * h, guess);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) end[i] = x[i] + h * s->xd[i];
-    s->n_found = 0;
-    failed = symdyn_rounds(s, c, t, h, x, end);  // without contacts: what they are looked for with
+    s->n_found = c->n = 0;
+    failed = symdyn_rounds(s, c, t, h, x, end, 0);  // without contacts: what they are looked for with
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
-    int added = 0;
+    int added = 0, rough = 0;
     failed = symdyn_gaps(s, t, x);
     if (!failed) failed = symdyn_add(s, c, &added);  // what touches already
     if (failed) return failed;
@@ -421,10 +428,11 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
         failed = symdyn_gaps(s, t + 0.5 * h, guess);
         if (!failed) failed = symdyn_add(s, c, &more);
         if (failed) return failed;
-        if (!more && !added) break;
+        if (!more && !added && !rough) break;
         added = 0;
+        rough = s->rough_sweeps && pass + 1 < s->most_passes;
         failed = symdyn_begin(s, t, x);
-        if (!failed) failed = symdyn_rounds(s, c, t, h, x, end);
+        if (!failed) failed = symdyn_rounds(s, c, t, h, x, end, rough);
         if (failed) return failed;
         for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
     }

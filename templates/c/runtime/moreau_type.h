@@ -39,6 +39,7 @@ typedef struct {
 
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
+    long rough_sweeps;                // of one whose solution is a guess for the next; 0: as many as of the others
     double accepted;                  // change of the last round with contacts, by the size of the state
     int most_passes;                  // of a step, in which further contacts may close
     int most_rounds;                  // of a step
@@ -48,7 +49,9 @@ typedef struct {
     // Contacts of the latest step: places of both bodies, or of the contact and -1; planes come after the bodies.
     long *a, *b, *was_a, *was_b, *sum_a, *sum_b, *old_a, *old_b, *old_from, n_old;
     int *old_state, *broken;
-    double *P_old, *basis, *incoming, *gap_of, *kept_P;
+    double *P_old, *basis, *incoming;
+    double *P_guess;  // impulses of the pass before, at was_at of each contact; -1: it is new
+    long *was_at;
     long n_found;                        // contacts of the latest step
     double *at_end;                      // n*4: gap, then relative velocities at its end
     double worst_residual, worst_depth;  // of all steps so far
