@@ -118,7 +118,7 @@ class EventRecord(NamedTuple):
 class ContactRecord(NamedTuple):
     """A rigid contact in one place: the contact that it is of, its number of rows, the parameters that its mode is set by ("" and
     none without friction), what its events are called after its name, its law of impacts, its kind, whether its first row is a
-    normal one, parameters that are lengths of its shapes."""
+    normal one; ranges: as of a CompliantRecord."""
 
     name: str
     contact: str
@@ -130,7 +130,7 @@ class ContactRecord(NamedTuple):
     impact: str
     kind: str
     normal: bool
-    lengths: tuple[str, ...] = ()
+    ranges: tuple[tuple[str, str, float, bool, float], ...] = ()
 
     @property
     def tangents(self) -> int:
@@ -155,7 +155,7 @@ class GroupRecord(NamedTuple):
 
 class CompliantRecord(NamedTuple):
     """A compliant contact in one place, its number of rows, and which numbers parameters may give it: what each is of the
-    contact, the parameter's name, "" of an expression, whose value the function compliant_numbers gives; the least number,
+    contact, the parameter's name, "" of an expression, whose value the function contact_coefficients gives; the least number,
     whether that itself is one, and the number that it stays below."""
 
     name: str

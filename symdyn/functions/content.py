@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.sensitivities import column_names, held_names
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import given_rates, has_function, switches, tape_as_derived, tapes_of
+from symdyn.model.contacts.compliance import Range
 from symdyn.model.symbols import GivenMotion
 from symdyn.shown import name_of
 from symdyn.tape.balance import balance
@@ -110,10 +111,14 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         output_units=dict(equations.symbols.point_units),
         contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name if c.normal else "",
                                      c.switches[-1].name if len(c.rows) > c.normal else "", tuple(s.name for s in c.sliding),
-                                     c.events, c.impact, c.kind, c.normal, c.lengths) for c in equations.contacts),
-        compliant=tuple(CompliantRecord(c.name, len(c.rows), tuple(
-            (what, e.name if e.is_Symbol else "", *limits) for what, e, *limits in c.ranges)) for c in equations.compliant),
+                                     c.events, c.impact, c.kind, c.normal, _ranges(c.ranges)) for c in equations.contacts),
+        compliant=tuple(CompliantRecord(c.name, len(c.rows), _ranges(c.ranges)) for c in equations.compliant),
         contact_groups=_group_records(equations))
+
+
+def _ranges(ranges: Iterable[Range]) -> tuple[tuple[str, str, float, bool, float], ...]:
+    """What numbers of a contact may be, as plain data."""
+    return tuple((what, e.name if e.is_Symbol else "", *limits) for what, e, *limits in ranges)
 
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.model.closures import Gear, Rod
+from symdyn.model.contacts.compliance import numbers_of
 from symdyn.model.contacts.lowering import SOFTNESS
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
@@ -74,10 +75,10 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
             value = output.value
             yield f"output {shown(output.name)}", value if isinstance(value, tuple) else [value], Scope.FORCES
     for contact in s.rigid_contacts:
-        yield f"contact {contact.name}", contact.expressions, Scope.MOTION
+        yield f"contact {contact.name}", [*contact.expressions, *numbers_of(contact.ranges)], Scope.MOTION
         yield f"contact {contact.name}: friction and restitution", contact.constants, Scope.PARAMETERS
     for compliant in s.compliant_contacts:
-        yield f"contact {compliant.name}", [*compliant.expressions, *compliant.numbers], Scope.MOTION
+        yield f"contact {compliant.name}", [*compliant.expressions, *numbers_of(compliant.ranges)], Scope.MOTION
     for group in s.lowered_groups:
         yield f"contact group {group.name}", group.constants, Scope.PARAMETERS
     if s.rigid_contacts:

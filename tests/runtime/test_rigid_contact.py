@@ -670,8 +670,22 @@ def test_lengths_that_parameters_make_impossible_and_normals_without_direction_a
     r = sd.parameters("r")
     system = planar("wheel", [sd.Contact("rim", "body", "ground", shape=sd.contacts.Sphere(r), friction=0.1)], 1.0, 0.1)
     system.defaults[r] = 0.1
-    with pytest.raises(ArgumentError, match=r"r, a length of contact rim, is -0\.2; pass a number"):
+    with pytest.raises(ArgumentError, match=r"radius of the shape on a of contact rim is -0\.2; pass a number from 0 on"):
         system.compile().simulate((0, 1), q=[0, 1, 0], params={r: -0.2})
+    pin = planar("pin", [sd.Contact("bearing", "body", "ground", shape=(sd.contacts.Sphere(2 * r), sd.contacts.Bore(r + 0.3)))],
+                 1.0, 0.1)
+    pin.defaults[r] = 0.1
+    module = pin.compile()
+    assert module.simulate((0, 0.01)).success
+    with pytest.raises(ArgumentError, match=r"room in the bore of contact bearing is -0\.1; pass a number above 0"):
+        module.simulate((0, 0.01), params={r: 0.4})
+    with pytest.raises(ArgumentError, match=r"radius of the shape on a of contact bearing is -0\.02; pass"):
+        module.simulate((0, 0.01), params={r: -0.01})
+    brick = planar("brick", [sd.Contact("corner", "body", "ground", shape=sd.contacts.Box([r - 0.1, r]))], 1.0, 0.1)
+    brick.defaults[r] = 0.5
+    batch = brick.compile().simulate_batch(q={"y": 1.0}, params={"r": [0.4, 0.1]}, t=np.linspace(0, 0.01, 3))
+    assert batch.success.tolist() == [True, False]
+    assert batch.messages[1] == "brick: edge 1 of the box of contact corner is 0; pass a number above 0"
     with pytest.raises(ModelError, match=r"edge 2 of the box is -0\.2"):
         planar("box", [sd.Contact("corner", "body", "ground", shape=sd.contacts.Box([0.4, -0.2]))], 1.0, 0.1).compile()
     shape = (sd.contacts.Sphere(0.1), sd.contacts.Sphere(0.1))

@@ -26,6 +26,8 @@ from symdyn.formulation.trees.kinematics import Kinematics
 from symdyn.formulation.trees.newton_euler import inward, outward
 from symdyn.formulation.trees.reactions import reactions
 from symdyn.formulation.trees.tree import GROUND, Tree
+from symdyn.model.contacts.compliance import numbers_of
+from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.elements import Element, MooringLine
 from symdyn.model.joints import Joint
 from symdyn.model.loads import ForceBetween, SpringDamper
@@ -97,14 +99,18 @@ class TreeQuantities(Motion):
         """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
         return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
 
-    def compliant_numbers(self) -> np.ndarray:
-        """Coefficients and lengths of compliant contacts that are expressions of parameters, one after the other."""
-        return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.numbers])
+    def contact_coefficients(self) -> np.ndarray:
+        """Coefficients and lengths of contacts that are expressions of parameters, one after the other, rigid contacts first."""
+        return vector(*[self.algebra.expression(e) for contact in self._contacts for e in numbers_of(contact.ranges)])
 
     def contact_points(self) -> np.ndarray:
         """Where every contact of bodies touches and the force on its body a, n-frame, rigid contacts first."""
         places = [(c.at, c.acting) for c in self.model.contacts if c.at] + [(c.at, c.acting) for c in self.model.compliant]
         return vector(*[self.expression(e) for at, acting in places for e in (*at, *acting)])
+
+    @property
+    def _contacts(self) -> tuple[RigidContact | CompliantContact, ...]:
+        return (*self.model.contacts, *self.model.compliant)
 
     def _apart(self, memory: dict[str, Any]) -> Self:
         """The same quantities, to be recorded apart from these."""
@@ -142,8 +148,8 @@ class TreeQuantities(Motion):
             own["weights"] = self.weights
         if self.model.compliant:
             own["compliant_contacts"] = self.compliant_contacts
-        if any(contact.numbers for contact in self.model.compliant):
-            own["compliant_numbers"] = self.compliant_numbers
+        if any(numbers_of(contact.ranges) for contact in self._contacts):
+            own["contact_coefficients"] = self.contact_coefficients
         limited = any(contact.depth is not None or contact.creep is not None for contact in self.model.compliant)
         if limited or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])

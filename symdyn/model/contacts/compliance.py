@@ -8,7 +8,7 @@ Source: Hunt and Crossley, Coefficient of restitution interpreted as damping in 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -196,14 +196,22 @@ def _ranges(given: Compliance) -> list[Range]:
     return found
 
 
-def ranges_by_parameters(given: Compliance, static: sp.Expr, kinetic: sp.Expr,
-                         lengths: Mapping[str, sp.Expr]) -> tuple[Range, ...]:
-    """What the numbers of a compliant contact may be that follow from parameters; lengths: of its shapes."""
+def by_parameters(ranges: Iterable[Range]) -> tuple[Range, ...]:
+    """Those of values that follow from parameters."""
+    return tuple(one for one in ranges if isinstance(one.value, sp.Basic) and not one.value.is_number)
+
+
+def numbers_of(ranges: Iterable[Range]) -> list[sp.Expr]:
+    """The values of ranges that are no parameters but expressions of these."""
+    return [one.value for one in ranges if not one.value.is_Symbol]
+
+
+def ranges_of(given: Compliance, static: sp.Expr, kinetic: sp.Expr) -> list[Range]:
+    """What coefficients of a compliant contact may be."""
     friction = [Range("static friction", static), Range("kinetic friction", kinetic, reached=given.bristles is None)]
     if static != kinetic:
         friction.append(Range("static friction less kinetic friction", static - kinetic))
-    found = [*friction, *_ranges(given), *[Range(what, length) for what, length in lengths.items()]]
-    return tuple(one for one in found if isinstance(one.value, sp.Basic) and not one.value.is_number)
+    return [*friction, *_ranges(given)]
 
 
 def compliance_faults(where: str, given: object, numbers: Callable[[Any], float | None], static: sp.Expr,

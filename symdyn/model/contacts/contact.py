@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import sympy as sp
 
 from symdyn.model.contacts.coefficients import above, coefficients, range_faults, value_of
-from symdyn.model.contacts.compliance import Compliance, compliance_faults
+from symdyn.model.contacts.compliance import Compliance, Range, compliance_faults
 from symdyn.model.contacts.shapes import Bore, Box, Cam, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface, Torus
 from symdyn.model.faults import Faults
 from symdyn.real_numbers import length_of
@@ -118,6 +118,16 @@ class Contact:
             reach = sp.sqrt(reach**2 + (number(a.length, "length") / 2)**2)
         return number(self.on_b.radius, "radius") - reach
 
+    @property
+    def ranges(self) -> list[Range]:
+        """What radii and lengths of its shapes, and its room in a bore, may be."""
+        found = [Range(what, length, reached=self._may_vanish(what)) for what, length in self.lengths.items()]
+        return found if self.room is None else [*found, Range("room in the bore", self.room, reached=False)]
+
+    def _may_vanish(self, what: str) -> bool:
+        """Whether a radius or length may be 0, as that of a sphere, which is a point then, or of a tube."""
+        return isinstance(self.on_b if what.endswith("b") else self.on_a, Sphere) or what.startswith("tube")
+
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
         found = []
@@ -129,8 +139,7 @@ class Contact:
         numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
         found += range_faults(self.where, numbers)
         found += [f"{self.where}: {what} is 0; pass a length above 0" for what in self.lengths
-                  if numbers.get(what) == 0 and not isinstance(self.on_b if what.endswith("b") else self.on_a, Sphere)
-                  and not what.startswith("tube")]
+                  if numbers.get(what) == 0 and not self._may_vanish(what)]
         room = None if self.room is None else number(self.room)
         if room is not None and room <= 0 and not found:
             found.append(f"{self.where}: the {type(self.on_a).__name__} on a does not fit into the Bore on b, which is "

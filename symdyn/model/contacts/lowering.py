@@ -15,7 +15,7 @@ import sympy as sp
 
 from symdyn.contact_kinds import BODIES, FRICTION
 from symdyn.model.bodies import Body
-from symdyn.model.contacts.compliance import Compliance, Range, law_of, ranges_by_parameters
+from symdyn.model.contacts.compliance import Compliance, Range, by_parameters, law_of, ranges_of
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
 from symdyn.model.contacts.group import lowered
@@ -55,7 +55,7 @@ class RigidContact:
     events    what its events are called after its name
     kind      BODIES, or that of the element of joints
     at, acting   where it touches and the force on body a, n-frame; empty of an element of joints
-    lengths   parameters that are radii and lengths of its shapes
+    ranges    what radii and lengths of its shapes may be that follow from parameters
     width     of a shape that may touch in several places, m; None of others
     """
 
@@ -75,7 +75,7 @@ class RigidContact:
     kind: str = BODIES
     at: tuple[sp.Expr, ...] = ()
     acting: tuple[sp.Expr, ...] = ()
-    lengths: tuple[str, ...] = ()
+    ranges: tuple[Range, ...] = ()
     width: sp.Expr | None = None
 
     @property
@@ -127,11 +127,6 @@ class CompliantContact:
         """The size of the slip while it is closed and friction is below HELD of what it reaches in the end, else zero, m/s."""
         slip = sp.sqrt(sp.Add(*[v**2 for v in self.rows[1:]]))
         return sp.Piecewise((slip, sp.And(self.gap < 0, slip < HELD / sp.sqrt(1 - HELD**2) * self.slip_speed)), (0, True))
-
-    @property
-    def numbers(self) -> list[sp.Expr]:
-        """The values of its ranges that are no parameters but expressions of these."""
-        return [one.value for one in self.ranges if not one.value.is_Symbol]
 
 
 def contact_force(name: str, row: int, unit: str = "N") -> Quantity:
@@ -215,7 +210,7 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
     system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
                                               tuple(events), at=geometry.place(touch), acting=_along(directions, forces),
-                                              lengths=tuple(s.name for s in contact.lengths.values() if s.is_Symbol),
+                                              ranges=by_parameters(contact.ranges),
                                               width=touch.width))
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
@@ -247,7 +242,6 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     """Loads of a compliant contact, and the states of its bristles."""
     compliance = contact.compliance
     assert isinstance(compliance, Compliance)  # checked before
-    lengths = contact.lengths if contact.room is None else {**contact.lengths, "room in the bore": contact.room}
     names = [f"{touch.name}_bristle"] if len(rows) == 2 else [f"{touch.name}_bristle_{axis}" for axis in "xy"]
     deflections = [Coordinate(name) for name in names[:len(rows) - 1]] if compliance.bristles is not None else []
     law = law_of(compliance, contact.static, contact.kinetic, touch.gap, rows, deflections, geometry.faults, contact.where)
@@ -255,8 +249,8 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
     system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
                                                       compliance.creep, geometry.place(touch), _along(directions, law.forces),
-                                                      ranges_by_parameters(compliance, contact.static, contact.kinetic,
-                                                                           lengths)))
+                                                      by_parameters([*ranges_of(compliance, contact.static, contact.kinetic),
+                                                                     *contact.ranges])))
     _act(system, geometry, touch, directions, law.forces)
     if compliance.located:
         stays = next(q for joint in system.joints for q in joint.coordinates if isinstance(q, Coordinate))

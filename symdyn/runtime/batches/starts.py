@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.errors import SymdynError
-from symdyn.runtime.compliance import impossible
 from symdyn.runtime.consistent import CONSISTENT, check_start, normalised
 from symdyn.runtime.constraints import length, names, position_residual, velocity_residual
+from symdyn.runtime.contact_numbers import impossible
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module

@@ -143,16 +143,12 @@ def turning(at: Numbers, tangents: Sequence[int]) -> float:
     return gain / max(float(np.linalg.norm(at.slip[tangents])), 1e-300)
 
 
-def _check_coefficients(module: Module, at: Numbers, p: np.ndarray) -> None:
-    """Raise ArgumentError for friction, restitution and lengths that cannot be, as `params` may give them."""
+def _check_coefficients(module: Module, at: Numbers) -> None:
+    """Raise ArgumentError for friction and restitution that cannot be, as `params` may give them."""
     of_contacts = zip(at.static.tolist(), at.kinetic.tolist(), at.restitution.tolist(), strict=True)
-    regular = all(0 <= kinetic <= static and 0 <= e <= 1 for static, kinetic, e in of_contacts)
-    if regular and not any(record.lengths for record in module.metadata.contacts):
+    if all(0 <= kinetic <= static and 0 <= e <= 1 for static, kinetic, e in of_contacts):
         return
-    values = dict(zip(module.metadata.parameters, p, strict=False))
-    lengths = {name: record.contact for record in module.metadata.contacts for name in record.lengths}
-    faults = [f"{name}, a length of contact {contact}, is {values[name]:g}; pass a number that is not negative"
-              for name, contact in lengths.items() if values.get(name, 0.0) < 0]
+    faults: list[str] = []
     for record, static, kinetic, e in zip(module.metadata.contacts, at.static, at.kinetic, at.restitution, strict=True):
         faults += [f"{what} of contact {record.name} is {value:g}; pass a number that is not negative" for what, value in
                    (("static friction", static), ("kinetic friction", kinetic), ("restitution", e)) if value < 0]
@@ -215,7 +211,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not, and for coefficients
     that parameters make impossible."""
     at, records = numbers(module, t, x, p, inputs), module.metadata.contacts
-    _check_coefficients(module, at, p)
+    _check_coefficients(module, at)
     if min(at.gap.tolist()) >= -TOUCHING:
         return
     passed = ignored(module, t, x, p, inputs)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
-from symdyn.runtime.compliance import check_compliance
 from symdyn.runtime.consistent import check_start
+from symdyn.runtime.contact_numbers import check_contact_numbers
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.across import Chain
@@ -109,8 +109,8 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     asked = Asked.of(module, by, p, free)
     method = _checked(module, request, asked, method or DEFAULT)
     check_start(module, span[0], start, p)
-    if metadata.compliant:
-        check_compliance(module, span[0], start, p, free.at(span[0], start))
+    if metadata.compliant or metadata.contacts:
+        check_contact_numbers(module, span[0], start, p, free.at(span[0], start))
     if metadata.contacts:
         check_overlap(module, span[0], start, p, free.at(span[0], start))
     request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))

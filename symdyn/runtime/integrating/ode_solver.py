@@ -14,8 +14,8 @@ from scipy.integrate import DenseOutput, OdeSolver
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.kinds import flag
-from symdyn.runtime.compliance import check_compliance
 from symdyn.runtime.consistent import check_start, normalised
+from symdyn.runtime.contact_numbers import check_contact_numbers
 from symdyn.runtime.inputs.inputs import Inputs, take_inputs
 from symdyn.runtime.integrating.charts import warn_near_lock
 from symdyn.runtime.integrating.compiled import Run, stopped_because
@@ -122,8 +122,8 @@ class CompiledSolver(OdeSolver):
         self.module = of.module.following(free)
         start = normalised(self.module, self.y.copy())
         check_start(self.module, t0, start, of.p)
-        if self.module.metadata.compliant:
-            check_compliance(self.module, t0, start, of.p, free.at(t0, start))
+        if self.module.metadata.compliant or self.module.metadata.contacts:
+            check_contact_numbers(self.module, t0, start, of.p, free.at(t0, start))
         self.request = request = self._request(free, (t0, t_bound), start, rtol, atol, max_step, first_step)
         check_compiled(self.module, request, of.method)
         request = replace(request, stabilization=stabilization_of(self.module, request, of.method, of.stabilization))

@@ -18,8 +18,8 @@ from symdyn.errors import ArgumentError, EvaluationError, SimulationInterrupted,
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.real_numbers import length_of, number, number_of, real, real_of
-from symdyn.runtime.compliance import check_compliance
 from symdyn.runtime.consistent import check_start, normalised
+from symdyn.runtime.contact_numbers import check_contact_numbers
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating import hybrid
@@ -104,8 +104,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             stack.enter_context(module.noting(lambda label: bar.set_description(_underway(module, label))))
         with contextlib.suppress(InputRaised):  # the run ends with it, as with what raises later
             check_start(module, span[0], start, p)
-            if metadata.compliant:
-                check_compliance(module, span[0], start, p, free.at(span[0], start))
+            if metadata.compliant or metadata.contacts:
+                check_contact_numbers(module, span[0], start, p, free.at(span[0], start))
             if metadata.contacts:
                 check_overlap(module, span[0], start, p, free.at(span[0], start))
             if metadata.contact_groups:

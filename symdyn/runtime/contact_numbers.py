@@ -1,4 +1,4 @@
-"""Numbers of compliant contacts that cannot be, as `params` may give them."""
+"""Numbers of contacts that cannot be, as `params` may give them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.backend.metadata import CompliantRecord, ContactRecord
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.real_numbers import in_range, range_text
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-NUMBERS = "compliant_numbers"
+NUMBERS = "contact_coefficients"
 
 
 def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> dict[int, str]:
-    """What is wrong with numbers of compliant contacts, by row; rows where nothing is are left out.
+    """What is wrong with numbers of contacts, by row; rows where nothing is are left out.
 
     t        of the starts, s
     starts   (n, n_x) or (1, n_x), params: (n, n_p) or (1, n_p), inputs: (n, n_in) or (1, n_in)
@@ -26,7 +27,7 @@ def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray,
     found: dict[int, dict[str, None]] = {}
     values = _values(module, t, starts, params, inputs) if NUMBERS in module.metadata.functions else np.zeros((1, 0))
     seen = 0
-    for contact in module.metadata.compliant:
+    for contact in _contacts(module):
         for what, name, least, reached, below in contact.ranges:
             if not name:
                 column, seen = values[:, seen], seen + 1
@@ -36,15 +37,24 @@ def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray,
                 continue
             good = in_range(column, least, reached, below)
             for row in np.flatnonzero(~good & np.isfinite(params).all(axis=1)).tolist():  # the others have a reason of their own
-                found.setdefault(row, {})[f"{what} of contact {contact.name} is {column[row]:g}; "
+                found.setdefault(row, {})[f"{what} of contact {_name(contact)} is {column[row]:g}; "
                                           f"{range_text(least, reached, below)}"] = None
     return {row: f"{module.name}: {'; '.join(faults)}" for row, faults in found.items()}
+
+
+def _contacts(module: Module) -> tuple[ContactRecord | CompliantRecord, ...]:
+    return (*module.metadata.contacts, *module.metadata.compliant)
+
+
+def _name(contact: ContactRecord | CompliantRecord) -> str:
+    """What the user calls it, of a box for all its corners."""
+    return contact.contact if isinstance(contact, ContactRecord) else contact.name
 
 
 def _values(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """What expressions of parameters are, (n, n_values); not a number where they cannot be evaluated."""
     together = len(params) == 1
-    width = sum(not name for contact in module.metadata.compliant for _, name, *_ in contact.ranges)
+    width = sum(not name for contact in _contacts(module) for _, name, *_ in contact.ranges)
     found = np.full((max(len(starts), len(inputs)) if together else len(params), width), np.nan)
     for k, p in enumerate(params):
         rows = slice(None) if together else slice(k, k + 1)
@@ -54,7 +64,7 @@ def _values(module: Module, t: float, starts: np.ndarray, params: np.ndarray, in
     return found
 
 
-def check_compliance(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> None:
-    """Raise ArgumentError for numbers of compliant contacts that cannot be; x: (n_x,), p: (n_p,), inputs: (n_in,)."""
+def check_contact_numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> None:
+    """Raise ArgumentError for numbers of contacts that cannot be; x: (n_x,), p: (n_p,), inputs: (n_in,)."""
     if found := impossible(module, t, x[None, :], p[None, :], np.atleast_2d(inputs)):
         raise ArgumentError(found[0])
