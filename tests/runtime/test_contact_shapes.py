@@ -287,6 +287,79 @@ def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
     assert np.abs(motion((Shapes.Point(), Shapes.Cam(radius, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
 
 
+SOFT: dict[str, Any] = {"law": "compliant", "friction": 0.3,
+                        "compliance": Shapes.Compliance(2000.0, dissipation=0.2, located=True)}
+
+
+@pytest.mark.filterwarnings("error::symdyn.errors.SimulationWarning")
+@pytest.mark.parametrize("name", SAME)
+def test_a_circle_deep_in_a_curve_moves_as_in_the_shape_that_the_curve_is(name: str) -> None:
+    curve, shape, _, start = SAME[name]
+    runs = [wheel((SPHERE, other), **SOFT).simulate((0, 1), q=start, rtol=1e-11) for other in (curve, shape)]
+    gaps = [run.contacts["touch"].gap for run in runs]
+    assert gaps[1].min() < -0.03
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-8
+    assert np.abs(gaps[0] - gaps[1])[gaps[1] < 0].max() < 1e-8
+
+
+@pytest.mark.filterwarnings("error::symdyn.errors.SimulationWarning")
+@pytest.mark.parametrize("shape", [SPHERE, Shapes.Disc(0.2), Shapes.Torus(0.15, 0.05)])
+def test_shapes_deep_in_a_surface_move_as_in_the_bowl_that_it_is(shape: Any) -> None:
+    bowl = Shapes.Surface(2 - sp.sqrt(4 - X**2 - Y**2), X, Y)
+    q, u = [-0.9, 0.1, 0.9, np.cos(0.5), np.sin(0.5), 0, 0], [0, 0.5, 0, 0, 1.0, 3.0]
+    others = (bowl, Shapes.Bore(2, [0, 0, 2]))
+    runs = [ball((shape, other), **SOFT).compile().simulate((0, 0.5), q, u, rtol=1e-11) for other in others]
+    assert runs[1].contacts["touch"].gap.min() < -0.03
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-8
+
+
+def test_a_circle_deep_in_a_cam_moves_as_in_the_eccentric_circle_that_it_is() -> None:
+    radius = 0.1 * sp.cos(X) + sp.sqrt(0.25 - 0.01 * sp.sin(X)**2)
+    pairs = [(SPHERE, Shapes.Cam(radius, X)), (SPHERE, Shapes.Sphere(0.5, [0.1, 0]))]
+    runs = [wheel(pair, **SOFT).simulate((0, 0.6), q=[0.05, 1.0, 0], rtol=1e-11) for pair in pairs]
+    assert runs[1].contacts["touch"].gap.min() < -0.03
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-8
+
+
+BENT = {"a point in a parabola": Shapes.Curve(X**2, X),
+        "a point in a spline": Shapes.Curve(CubicSpline(GRID, GRID**2), X),
+        "a circle in a parabola": Shapes.Curve(X**2, X),
+        "a point on a cam": Shapes.Cam(1 + sp.cos(2 * X) / 5, X),
+        "a circle on a cam": Shapes.Cam(1 + sp.cos(2 * X) / 5, X),
+        "a point in a surface": Shapes.Surface(X**2 + Y**2 / 2, X, Y),
+        "a torus in a surface": Shapes.Surface(X**2 + Y**2 / 2, X, Y)}
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_what_is_deep_in_a_bent_shape_keeps_its_energy(name: str) -> None:
+    """Kinetic and potential energy with that of the depth d, 2/5 k d^(5/2); the shape is fixed to a body that swings."""
+    space, stiffness = name.endswith("surface"), 2000.0
+    system = sd.System("bent", gravity=[0.3, 0, -9.81] if space else [0.3, -9.81])
+    body, bent = (system.add_body(kind, mass=m, inertia=[0.2 * m, 0.3 * m, 0.1 * m] if space else 0.1 * m)
+                  for kind, m in (("body", 1.0), ("bent", 20.0)))
+    system.add_joint(sd.Free("free", system.ground, body) if space else sd.Planar("free", system.ground, body))
+    system.add_joint(sd.Revolute("swing", system.ground, bent))
+    inside = [0.05, 0.02, 0.01] if space else [0.05, 0.02]
+    shape = (Shapes.Point(inside) if "point" in name else Shapes.Torus(0.15, 0.05, [0, 1, 0.2], inside) if "torus" in name
+             else Shapes.Sphere(0.2, inside))
+    law = {"law": "compliant", "compliance": Shapes.Compliance(stiffness)}
+    system.add_contact(sd.Contact("touch", body, bent, shape=(shape, BENT[name]), **law))
+    module = system.compile()
+    q = [0.3, 0.1, 0.6, 0.1, 0.2, 0.3, 0] if space else [0.3, 1.6 if "cam" in name else 0.7, 0.3, 0]
+    u = [0.5, 0.3, 0, 0.2, 0.1, 0.3, 0.4] if space else [0.2, 0, 0.5, 0.4]
+    solution = module.simulate((0, 0.6), q=q, u=u, rtol=1e-10)
+    depth = np.maximum(0, -solution.contacts["touch"].gap)
+    energy = solution.energy + 2 / 5 * stiffness * depth**2.5
+    assert depth.max() > 0.05
+    assert np.ptp(energy) < 2e-6
+    k = int(depth.argmax())
+    in_numpy = system.compile(backend="numpy").rhs(solution.t[k], solution.x[k])
+    assert in_numpy == pytest.approx(module.rhs(solution.t[k], solution.x[k]), rel=1e-9, abs=1e-9)
+    step = 1e-6 * np.eye(len(q) + len(u))
+    slopes = [(module.rhs(0.0, solution.x[k] + d) - module.rhs(0.0, solution.x[k] - d)) / 2e-6 for d in step]
+    assert np.allclose(module.jacobian(0.0, solution.x[k]).x, np.transpose(slopes), rtol=1e-5, atol=1e-4)
+
+
 def test_what_is_wider_than_a_hollow_is_reported_where_it_touches_twice() -> None:
     module = wheel((SPHERE, Shapes.Curve(sp.sqrt(X**2 + sp.Rational(1, 10000)), X)))
     start = [-0.5, 1.2, 0]

@@ -2,7 +2,9 @@
 
 The gap g is the distance along the normal n, which points from body b to body a. The rows of a contact are the components of the
 relative velocity of the material points that touch, along n and the tangents; for distances that along n is the rate of the gap,
-since the touching points move along their surfaces only (envelope theorem).
+since the touching points move along their surfaces only (envelope theorem). The gap of a point over a curve or surface is the
+distance to first order; while it touches rigidly it is on the curve. In a compliant contact it may be deep, and n is the gradient
+of the gap, so that the normal force is that of a potential; round shapes have their distance there.
 """
 
 from __future__ import annotations
@@ -83,6 +85,7 @@ class Geometry:
     def __init__(self, contact: Contact, planar: bool, fixed: bool, faults: Faults) -> None:
         self.contact, self.planar, self.fixed, self.faults = contact, planar, fixed, faults
         self.a, self.b = (str(getattr(body, "name", body)) for body in (contact.a, contact.b))
+        self.yields = contact.law == "compliant"
         self._spline = _spline_of(f"{contact.name}_height", contact.on_b)
 
     def touches(self) -> list[Touch]:
@@ -209,13 +212,20 @@ class Geometry:
         if shape is not None:
             if shape.axis is not None:
                 shape = Round(shape.radius, self._in_b(self._turned(self.a, shape.axis)), shape.tube)
-            touching, height = self._touching(symbols, height, local[:n], shape)
-        normal, size = _normal(symbols, height)
+            touching, height = self._touching(symbols, height, local[:n + 1], shape)
+        steep, size = _normal(symbols, height)
         at_point = dict(zip(symbols, touching, strict=True))
-        normal, size = tuple(e.xreplace(at_point) for e in normal), size.xreplace(at_point)
+        normal = (steep[0].xreplace(at_point), steep[1].xreplace(at_point), steep[2].xreplace(at_point))
         lever = (sp.S.Zero,) * 3 if shape is None else _lowest(shape, normal)
-        gap = (local[n] + lever[n] - height.xreplace(at_point)) / size
+        over, size = local[n] + lever[n] - height.xreplace(at_point), size.xreplace(at_point)
+        gap = over / size
         tangents = ((normal[1], -normal[0], sp.S.Zero),) if self.planar else self._tangents(normal)
+        if self.yields and shape is None:
+            up = sp.Symbol("ordinate", real=True)
+            slopes = _gradient((up - height) / _normal(symbols, height)[1], (*symbols, up))
+            normal = tuple([e.xreplace({**at_point, up: local[n]}) for e in slopes])
+        elif self.yields:
+            gap = over * sp.Piecewise((size, over < 0), (1 / size, True))
         return Touch(name, at, self._turned(self.b, lever), gap, self._turned(self.b, normal),
                      tuple(self._turned(self.b, t) for t in tangents),
                      None if shape is None else shape.radius + shape.tube)
@@ -249,15 +259,17 @@ class Geometry:
 
     def _touching(self, symbols: Sequence[sp.Symbol], height: sp.Expr, center: Sequence[sp.Expr],
                   shape: Round) -> tuple[tuple[sp.Expr, ...], sp.Expr]:
-        """Where a shape touches, along x (and y) of body b, and the height with the functions that it calls."""
+        """Where a shape touches, along x (and y) of body b, and the height with the functions that it calls; center: in b."""
         parameters = sorted(height.free_symbols - set(symbols), key=lambda s: s.name)
         n = len(symbols)
         axis = () if shape.axis is None else shape.axis
         tube = [shape.tube] * (shape.tube != 0)
-        given = (*center, shape.radius, *tube, *axis, *parameters)
+        up = center[n:] if self.yields else ()
+        given = (*center[:n], shape.radius, *tube, *axis, *parameters, *up)
         names = [*["c_x", "c_y"][:n], "radius", *["tube"][:len(tube)], *["e_x", "e_y", "e_z"][:len(axis)],
                  *[f"parameter_{k + 1}" for k in range(len(parameters))]]
         known = tuple(sp.Symbol(name, real=True) for name in names)
+        above = tuple(sp.Symbol("c_up", real=True) for _ in up)
         unknowns = tuple(sp.Symbol(name, real=True) for name in ("s_x", "s_y")[:n])
 
         def implicit(spline: Spline | None) -> Implicit:
@@ -274,10 +286,12 @@ class Geometry:
 
             residual = tuple(s - c - o for s, c, o in zip(unknowns, known, lever, strict=False))
             others = [value(offset) for offset in _other_points(own, lever, normal, n)]
-            return Implicit(unknowns, known, own.radius + own.tube, lever[n] - f, residual, tuple(others))
+            nearest = tuple(k - f.diff(s) * sp.Min(0, c + lever[n] - f) for c in above
+                            for s, k in zip(unknowns, residual, strict=True))
+            return Implicit(unknowns, (*known, *above), own.radius + own.tube, lever[n] - f, residual, tuple(others), nearest)
 
         found = self._found(implicit, given, "surface" if n == 2 else "curve", self._spline)
-        return (tuple(center), height) if found is None else (found[0], height if found[1] is None else found[1].at(*symbols))
+        return (tuple(center[:n]), height) if found is None else (found[0], height if found[1] is None else found[1].at(*symbols))
 
     def _found(self, implicit: Callable[[Spline | None], Implicit], given: Sequence[sp.Expr], what: str,
                spline: Spline | None = None) -> tuple[tuple[sp.Expr, ...], Spline | None] | None:
@@ -299,12 +313,24 @@ class Geometry:
             phi, spline = self._touching_cam(parameters, phi, sp.sqrt(x**2 + y**2), radius)
             if spline is not None:
                 R, slope = self._radius_of_cam(spline)
+        far = sp.sqrt(x**2 + y**2)
         tangent = _tangent(R.xreplace({REAL[0]: phi}), slope.xreplace({REAL[0]: phi}), radius)
-        (along, across), c, s = tangent.normal, sp.cos(phi), sp.sin(phi)
-        normal = (along * c - across * s, along * s + across * c, sp.S.Zero)
-        gap = (sp.sqrt(x**2 + y**2) - tangent.reach) * tangent.steep
+        c, s = sp.cos(phi), sp.sin(phi)
+
+        def turned(along: sp.Expr, across: sp.Expr) -> Triple:
+            return along * c - across * s, along * s + across * c, sp.S.Zero
+
+        normal, gap = turned(*tangent.normal), (far - tangent.reach) * tangent.steep
+        across = (normal[1], -normal[0], sp.S.Zero)
+        if self.yields and radius == 0:
+            away, general = sp.Symbol("distance", real=True), _tangent(R, slope, radius)
+            steep, turning, _ = _gradient((away - general.reach) * general.steep, (away, REAL[0]))
+            normal = turned(*[e.xreplace({away: far, REAL[0]: phi}) for e in (steep, turning / away)])
+        elif self.yields:
+            reach = _reach(R.xreplace({REAL[0]: phi}), tangent, far)
+            gap = sp.Piecewise((reach - radius, reach < radius), (gap, True))
         return Touch(name, at, self._turned(self.b, _scaled(normal, -radius)), gap, self._turned(self.b, normal),
-                     (self._turned(self.b, (normal[1], -normal[0], sp.S.Zero)),), None if radius == 0 else radius)
+                     (self._turned(self.b, across),), None if radius == 0 else radius)
 
     def _radius_of_cam(self, spline: Spline | None) -> tuple[sp.Expr, sp.Expr]:
         """R of a cam and its derivative, in REAL[0]; a circle, with faults, where there is none."""
@@ -348,7 +374,9 @@ class Geometry:
                 reach = there * sp.cos(angle - center) + sp.sqrt(sp.Max(0, square))
                 others.append((angle, sp.Piecewise((-reach, square > 0), (0, True))))
             known, residual = (center, away, r, *named), (phi + tangent.turned - center,)
-            return Implicit((phi,), known, sp.S.One, -tangent.reach, residual, tuple(others))
+            deep = _tangent(R, slope, sp.Min(r, _reach(R, tangent, away)))
+            return Implicit((phi,), known, sp.S.One, -tangent.reach, residual, tuple(others),
+                            (phi + deep.turned - center,) if self.yields else ())
 
         found = self._found(implicit, (psi, far, radius, *parameters), "cam", self._spline)
         return (psi, None) if found is None else (found[0][0], found[1])
@@ -442,12 +470,24 @@ class Tangent:
     steep: sp.Expr
 
 
+def _reach(R: sp.Expr, tangent: Tangent, distance: sp.Expr) -> sp.Expr:
+    """How far along the normal of a closed curve a point is that has this distance from its middle; see Tangent."""
+    along = R * tangent.normal[0]
+    return sp.sqrt(sp.Max(0, distance**2 - R**2 + along**2)) - along
+
+
 def _tangent(R: sp.Expr, slope: sp.Expr, r: sp.Expr) -> Tangent:
     size = sp.sqrt(R**2 + slope**2)
     n = (R / size, -slope / size)
     center = (R + r * n[0], r * n[1])
     reach = sp.sqrt(center[0]**2 + center[1]**2)
     return Tangent(n, reach, sp.atan2(center[1], center[0]), (n[0] * center[0] + n[1] * center[1]) / reach)
+
+
+def _gradient(gap: sp.Expr, symbols: Sequence[sp.Symbol]) -> Triple:
+    """By coordinates, of which there are two or three."""
+    slopes = [*[gap.diff(s) for s in symbols], sp.S.Zero]
+    return slopes[0], slopes[1], slopes[2]
 
 
 def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[tuple[sp.Expr, ...]]:

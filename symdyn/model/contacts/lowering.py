@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from symdyn.contact_kinds import BODIES, FRICTION
+from symdyn.contact_kinds import BODIES, FRICTION, RELEASES, TOUCHES
 from symdyn.model.bodies import Body
 from symdyn.model.contacts.compliance import Compliance, Range, by_parameters, law_of, ranges_of
 from symdyn.model.contacts.contact import Contact
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
 
 CLOSES, OPENS, STICKS, SLIPS, TURNS, IGNORED, COUNTS = "closes", "opens", "sticks", "slips", "turns", "ignored", "counts"
-TOUCHES, RELEASES = "touches", "releases"  # of compliant contacts
 # The part of the kinetic friction below which a compliant contact holds and should not slip.
 HELD = sp.Rational(99, 100)
 # A speed, m/s, that is added to the slip along the direction which friction in space is written by: a large one holds that

@@ -10,6 +10,9 @@ implicit function theorem, ds = -(dk/ds)^-1 dk. While the shape is more curved t
 and there is one solution at every c, however far away it is. Else the shape may touch in several places: points all around it
 tell whether it reaches lower elsewhere, where Newton's method then begins again.
 
+A shape of a compliant contact may be deeper than the surface. From s on, the same method then finds the point that is nearest to
+the deepest one of the shape: the two are apart along n, so that the depth is a distance, whose gradient is the normal.
+
 Source: do Carmo, Differential Geometry of Curves and Surfaces, 1976, section 3.5 (parallel surfaces); Nocedal and Wright,
 Numerical Optimization, 2nd ed., section 11.2 (a line search for equations).
 """
@@ -52,6 +55,7 @@ class Implicit:
     unknowns   s along x (and y); known: what they depend on, the centre first
     size       of the shape, m; value: how high its lowest point is above the curve or surface, over the height of the centre
     residual   k; others: other points of the shape, each along x (and y), and its value
+    nearest    k of a shape that may be deeper than the surface, the same where it is not; empty of others
     """
 
     unknowns: tuple[sp.Symbol, ...]
@@ -60,6 +64,7 @@ class Implicit:
     value: sp.Expr
     residual: tuple[sp.Expr, ...]
     others: tuple[tuple[sp.Expr, ...], ...]
+    nearest: tuple[sp.Expr, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "recorded"}  # made again where it is needed
@@ -76,17 +81,29 @@ class Implicit:
         def taken(*expressions: sp.Expr) -> list[Any]:
             return [record_expression(recorder, e, stands_for, memory) for e in expressions]
 
-        residual, n = taken(*self.residual), len(self.unknowns)
-        slopes = jacobian(recorder, residual, leaves[:n], "forward").ravel().tolist()
-        right = forward(recorder, residual, dict(zip(leaves[n:], changes, strict=True)))
+        n = len(self.unknowns)
+
+        def with_slopes(k: Sequence[sp.Expr]) -> tuple[list[Any], list[Any]]:
+            of_k = taken(*k)
+            return of_k, jacobian(recorder, of_k, leaves[:n], "forward").ravel().tolist()
+
+        found = [with_slopes(k) for k in (self.residual, self.nearest) if k]
+        (residual, slopes), (last, last_slopes) = found[0], found[-1]
+        right = forward(recorder, last, dict(zip(leaves[n:], changes, strict=True)))
         return Recorded(leaves, changes, [*residual, *slopes, *taken(self.value)], taken(*[e for p in self.others for e in p]),
-                        taken(self.size), _cramer(slopes, [-e for e in right]))
+                        taken(self.size), _cramer(last_slopes, [-e for e in right]),
+                        [*last, *last_slopes, *taken(self.value)] if self.nearest else [])
+
+    @property
+    def last(self) -> tuple[sp.Expr, ...]:
+        """k at the point that is found."""
+        return self.nearest or self.residual
 
 
 @dataclass(frozen=True)
 class Recorded:
     """Leaves of the unknowns and of what is known, and of its changes; then entries, each part by itself: k, dk/ds and the value;
-    the other points one after the other; the size; the changes of the unknowns."""
+    the other points one after the other; the size; the changes of the unknowns; k, dk/ds and the value of the nearest point."""
 
     leaves: list[Node]
     changes: list[Node]
@@ -94,6 +111,7 @@ class Recorded:
     others: list[Any]
     size: list[Any]
     tangents: list[Any]
+    nearest: list[Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +138,7 @@ class Touching(UserFunction):
     def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
         i = self.implicit
         at = dict(zip((*i.unknowns, *i.known), (*self.applied(arguments), *arguments), strict=True))
-        found = _cramer([e.diff(s) for e in i.residual for s in i.unknowns], [-e.diff(i.known[k]) for e in i.residual])[place]
+        found = _cramer([e.diff(s) for e in i.last for s in i.unknowns], [-e.diff(i.known[k]) for e in i.last])[place]
         return found.xreplace(at)
 
     def _solved(self, numbers: Arithmetic, values: Sequence[Any], close: Any) -> Any:
@@ -130,7 +148,8 @@ class Touching(UserFunction):
             return lambda s: _walked(numbers, entries, dict(zip(r.leaves, (*s, *values), strict=True)))
 
         with np.errstate(all="ignore"):
-            return touching_point(part(r.equations), part(r.others), list(values[:n]), part(r.size)(values[:n])[0], close)
+            return touching_point(part(r.equations), part(r.others), part(r.nearest) if r.nearest else None, list(values[:n]),
+                                  part(r.size)(values[:n])[0], close)
 
 
 def _walked(arithmetic: Arithmetic, entries: Sequence[Any], known: Mapping[Node, Any]) -> list[Any]:
@@ -207,8 +226,8 @@ def touching_from(equations: Any, s: Any, size: Any, close: Any) -> Any:
     return None
 
 
-def touching_point(equations: Any, others: Any, s: Any, size: Any, close: Any) -> Any:
-    """s where a shape is lowest, from a start; None where there is no such point."""
+def touching_point(equations: Any, others: Any, nearest: Any, s: Any, size: Any, close: Any) -> Any:
+    """s where a shape is lowest, from a start, then the nearest point if that is wanted; None where there is no such point."""
     n = len(s)
     best = touching_from(equations, s, size, close)
     for _ in range(4):
@@ -217,7 +236,8 @@ def touching_point(equations: Any, others: Any, s: Any, size: Any, close: Any) -
         points = [listed[i:i + n + 1] for i in range(0, len(listed), n + 1)]
         lowest = min(points, key=lambda point: point[n])
         if best is not None and not lowest[n] < best[1] - 1e-9 * size:
-            return best[0]
+            last = best if nearest is None else touching_from(nearest, best[0], size, close)
+            return None if last is None else last[0]
         found = touching_from(equations, lowest[:n], size, close)
         if found is None or (best is not None and not found[1] < best[1]):
             return None
@@ -313,6 +333,10 @@ def _text_in_c(label: str, i: Implicit) -> str:
         return [head, *[f"    {line}" for line in body], "}", ""]
 
     n_k, n_others = n + n * n, len(i.others)
+    equations, called, first, last = "", f"{label}_equations", "", "0"
+    if r.nearest:
+        equations, called = "void (*equations)(const double *, const double *, double *), ", "equations"
+        first, last = f"{label}_equations, ", f"{label}_from({label}_nearest, in, out, size, &value)"
     step = ("step[0] = -k[0]/k[1];\n        const int positive = k[1] > 0;" if n == 1 else
             "const double determinant = k[2]*k[5] - k[3]*k[4];\n"
             "        step[0] = (k[3]*k[1] - k[5]*k[0])/determinant;\n"
@@ -320,11 +344,11 @@ def _text_in_c(label: str, i: Implicit) -> str:
             "        const int positive = determinant > 0 && k[2] + k[5] > 0;")
     return "\n".join([
         *function(f"{label}_equations", r.equations), *function(f"{label}_others", r.others),
-        *function(f"{label}_size", r.size), f"""
+        *function(f"{label}_size", r.size), *(function(f"{label}_nearest", r.nearest) if r.nearest else []), f"""
 // Newton's method from s, with steps that are halved until the equations are met better; value: of the point that it finds.
-static int {label}_from(const double *in, double *s, double size, double *value) {{
+static int {label}_from({equations}const double *in, double *s, double size, double *value) {{
     double k[{n_k + 1}];
-    {label}_equations(in, s, k);
+    {called}(in, s, k);
     for (int round = 0; round < 50; round++) {{
         double step[{n}], start[{n}], square = 0, largest = 0, far = 0, part = 1;
         {step}
@@ -342,7 +366,7 @@ static int {label}_from(const double *in, double *s, double size, double *value)
         for (;;) {{
             double now = 0;
             for (int i = 0; i < {n}; i++) s[i] = start[i] + part*step[i];
-            {label}_equations(in, s, k);
+            {called}(in, s, k);
             for (int i = 0; i < {n}; i++) now += k[i]*k[i];
             if (now <= square*(1 - part/4)) break;
             part /= 2;
@@ -356,7 +380,7 @@ static int {label}(const double *in, double *out) {{
     double size, value = 0, best = 0, others[{(n + 1) * n_others}];
     for (int i = 0; i < {n}; i++) out[i] = in[i];
     {label}_size(in, out, &size);
-    int found = !{label}_from(in, out, size, &best);
+    int found = !{label}_from({first}in, out, size, &best);
     for (int i = 0; !found && i < {n}; i++) out[i] = in[i];
     for (int round = 0; round < 4; round++) {{
         int lowest = 0;
@@ -365,9 +389,9 @@ static int {label}(const double *in, double *out) {{
         for (int j = 1; j < {n_others}; j++) {{
             if (others[{n + 1}*j + {n}] < others[{n + 1}*lowest + {n}]) lowest = j;
         }}
-        if (found && !(others[{n + 1}*lowest + {n}] < best - 1e-9*size)) return 0;
+        if (found && !(others[{n + 1}*lowest + {n}] < best - 1e-9*size)) return {last};
         for (int i = 0; i < {n}; i++) s[i] = others[{n + 1}*lowest + i];
-        if ({label}_from(in, s, size, &value) || (found && !(value < best))) return 1;
+        if ({label}_from({first}in, s, size, &value) || (found && !(value < best))) return 1;
         for (int i = 0; i < {n}; i++) out[i] = s[i];
         best = value;
         found = 1;
@@ -387,13 +411,16 @@ def _text_in_python(label: str, i: Implicit) -> str:
         return [f"        def {name}(s):", *[f"            {line}" for line in body], ""]
 
     functions = [*function("equations", r.equations), *function("others", r.others), *function("size", r.size)]
+    functions += function("nearest", r.nearest) if r.nearest else []
     return "\n".join([
         *[line.rstrip().replace(": Any", "").replace(" -> Any", "")
           for f in (touching_from, touching_point) for line in [*inspect.getsource(f).splitlines(), ""]],
         f"def {label}(*values):", *["    import math", ""] * any("math." in line for line in functions),
         f"    results = np.full((len(values[0]), {n}), np.nan)", "    for state, at in enumerate(zip(*values)):",
         f"        {', '.join(names[n:])}, = at", "", *functions,
-        f"        start = list(at[:{n}])", f"        found = touching_point(equations, others, start, size(start)[0], {CLOSE!r})",
+        f"        start = list(at[:{n}])",
+        f"        nearest_ones = {'nearest' if r.nearest else None}",
+        f"        found = touching_point(equations, others, nearest_ones, start, size(start)[0], {CLOSE!r})",
         "        if found is not None:", "            results[state] = found",
         f"    return {'results[:, 0]' if n == 1 else 'tuple(results.T)'}"])
 

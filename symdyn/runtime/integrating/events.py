@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn import panels
+from symdyn.contact_kinds import RELEASES, TOUCHES
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.integrating.stabilization import Projector
 from symdyn.shown import LENGTH, name_of
@@ -137,14 +138,15 @@ def entangled(module: Module, happened: Sequence[Happened], times: Sequence[floa
 def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
     """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, the
     inputs that are given by functions, and those that are not enclosed; "" where none does, and where the user has chosen the
-    spacing of samples."""
+    spacing of samples. Kinks of compliant contacts, at which steps end, change nothing but the error of a step."""
     if look is None or spacing or not look.any():
         return ""
     parts = []
+    kinks = {f"{contact.name}_{what}" for contact in module.metadata.compliant for what in (TOUCHES, RELEASES)}
     for record, wanted in zip(module.metadata.events, look, strict=True):
         of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
         of += [record.unproved] if record.unproved else []
-        parts += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
+        parts += [f"{record.name} depends on {', '.join(of)}"] if wanted and of and record.name not in kinks else []
     if not parts:
         return ""
     return (f"{module.name}: zeros of events may be missed: {'; '.join(parts)}, and a pulse of a function between two samples is "
