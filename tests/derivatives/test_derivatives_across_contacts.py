@@ -69,6 +69,26 @@ def test_ball_at_rest_after_infinitely_many_impacts_depends_on_nothing(ball: Any
     assert max(np.abs(solution.sensitivity[name][-1]).max() for name in ("y(0)", "e", "g")) < 1e-9
 
 
+def test_gradient_across_infinitely_many_impacts_of_what_moves_along_names_sensitivities() -> None:
+    """A mass on a rope, which becomes taut ever again; sensitivities against differences."""
+    length, e = sd.parameters("length e")
+    system = sd.System("rope", gravity=[0, -G])
+    system.defaults = {length: 1.0, e: 0.5}
+    body = system.add_body("body", mass=1.0, inertia=1.0)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_contact(sd.Rope("rope", system.ground, body, length, restitution=e))
+    module = system.compile()
+    start: dict[str, Any] = {"q": [0.3, -0.4, 0], "u": [0.5, 0, 0], "rtol": 1e-10}
+    with pytest.warns(SimulationWarning, match="the impacts of rope accumulate at t = 0.848"):
+        solution = module.simulate((0, 2), sensitivities=[length, e], **start)
+    for parameter, value in system.defaults.items():
+        sides = [module.simulate((0, 2), params={parameter: value + step}, **start).x[-1] for step in (1e-5, -1e-5)]
+        assert np.abs(solution.sensitivity[parameter][-1] - (sides[0] - sides[1]) / 2e-5).max() < 1e-5
+    with pytest.warns(SimulationWarning), pytest.raises(EvaluationError, match=(
+            r"impacts accumulate near t = 0.848\d* s: end the motion before them, or take simulate\(..., sensitivities=")):
+        module.gradient(sd.Loss(end=sp.Symbol("x")), [length, e], (0, 2), **start)
+
+
 def test_integral_of_a_loss_over_impacts(ball: Any) -> None:
     """Of y^2 + y_dot^2 over a fall and the first flight, in closed form piece by piece."""
     (h, _, e, g), end = sp.symbols("h v e g", positive=True), 1.0

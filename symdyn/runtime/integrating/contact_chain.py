@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 # Near the begin or end of a slip in space: a part of a phase by the time from there, the longest step by that time, and the
 # longest one by the rate at which changes across the slip decay.
 PART, LONGEST, CALM = 0.5, 0.25, 2.0
+# Impacts before the end of infinitely many by less than this part of the time since the start of the motion are some of these.
+NEAR = 1e-2
 # A part that is shorter than this one of its time is not divided any more.
 SHORTEST = 16 * np.finfo(float).eps
 
@@ -136,8 +138,9 @@ class ContactChain:
 
     def _gathered(self, t: float) -> str:
         """What to add of impacts that accumulate near a time."""
-        near = [begin for _, begin, end in self.accumulated if begin <= t <= end]
-        return f"; impacts accumulate near t = {near[0]:.6g} s: end the motion before them" if near else ""
+        near = [end for _, _, end in self.accumulated if 0 <= end - t <= NEAR * (end - self.request.span[0])]
+        return (f"; impacts accumulate near t = {near[0]:.6g} s: end the motion before them, or take simulate(..., "
+                "sensitivities=[...]), which goes on with fewer digits") if near else ""
 
     def _check(self, outcome: Outcome) -> None:
         metadata = self.module.metadata
