@@ -118,7 +118,7 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
 
 def _ranges(ranges: Iterable[Range]) -> tuple[tuple[str, str, float, bool, float], ...]:
     """What numbers of a contact may be, as plain data."""
-    return tuple((what, e.name if e.is_Symbol else "", *limits) for what, e, *limits in ranges)
+    return tuple((one.what, one.value.name if one.value.is_Symbol else "", one.least, one.reached, one.below) for one in ranges)
 
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:
