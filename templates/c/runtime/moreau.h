@@ -248,10 +248,18 @@ static int symdyn_slips(const symdyn_moreau *s, const symdyn_cones *c, long i) {
     return c->state[i] == SYMDYN_SLIDING && sqrt(square) > s->tolerance;
 }
 
-// Solve for the impulses, in so many sweeps; contacts that stuck and slip now have kinetic friction.
-static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, long most_sweeps) {
+// Solve for the impulses; contacts that stuck and slip now have kinetic friction. rough: by few sweeps alone, which say nothing
+// of slip.
+static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, int rough) {
+    if (rough) {
+        const long most_dense = c->most_dense;
+        c->most_dense = 0;
+        symdyn_cones_solve(c, s->tolerance, s->rough_sweeps);
+        c->most_dense = most_dense;
+        return;
+    }
     for (int again = 1; again;) {
-        symdyn_cones_solve(c, s->tolerance, most_sweeps);
+        symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
         again = 0;
         for (long i = 0; i < c->n; i++)
             if (!s->broken[i] && symdyn_slips(s, c, i)) {
@@ -298,7 +306,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
                 for (long k = 0; k < m; k++) c->free[r + k] = w[k] - kicked[k];
                 if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
             }
-            symdyn_impulses(s, c, h, s->rough_sweeps && (rough || round + 1 < most) ? s->rough_sweeps : s->most_sweeps);
+            symdyn_impulses(s, c, h, s->rough_sweeps && (rough || round + 1 < most));
             for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
         }
         const double last = off;
