@@ -150,7 +150,14 @@ class DeviceArray:
         return _new(ctypes.addressof(managed), _NAME, _destructor)
 
     def to_numpy(self) -> np.ndarray:
-        """A copy in the memory of this process."""
+        """A copy in the memory of this process.
+
+        >>> from symdyn.runtime.gpu.dlpack import CPU, DeviceArray
+        >>> here = np.arange(6.0)
+        >>> rows = DeviceArray(here.ctypes.data, (2, 3), np.dtype(float), (CPU, 0), lambda: None, lambda: here.reshape(2, 3))
+        >>> rows.to_numpy().shape
+        (2, 3)
+        """
         return self._fetch()
 
     def __del__(self) -> None:
