@@ -142,6 +142,21 @@ def test_arrays_on_the_device_are_read_and_written_there(host: HostDevice, order
     assert not host.blocks
 
 
+def test_out_may_be_x_itself_and_nothing_else(host: HostDevice) -> None:
+    module = compiled("double_pendulum")
+    x = some(module)
+    here, both = module.rhs_batch(0.0, x), np.vstack([x, x])
+    whole = There(x)
+    assert module.rhs_batch(0.0, whole, out=whole, device="gpu") is whole and np.array_equal(x, here)
+    with pytest.raises(ArgumentError, match="out and x share memory on the device, where it would be read after it was written"):
+        module.rhs_batch(0.0, There(both[:N]), out=There(both[10:N + 10]), device="gpu")
+    with pytest.raises(ArgumentError, match="out and t share memory"):
+        module.rhs_batch(There(both[:N, 0]), There(both[:N].copy()), out=There(both[:N]), device="gpu")
+    apart = both[N:]
+    module.rhs_batch(0.0, There(both[:N]), out=There(apart), device="gpu")
+    assert np.array_equal(apart, module.rhs_batch(0.0, both[:N]))
+
+
 def test_what_nobody_takes_is_given_back(host: HostDevice) -> None:
     made = compiled("double_pendulum").rhs_batch(0.0, There(some(compiled("double_pendulum"))), device="gpu")
     capsule = made.__dlpack__()
@@ -162,6 +177,8 @@ def test_jax(host: HostDevice) -> None:
     x = jax.numpy.asarray(some(module), dtype="float32")
     found = jax.dlpack.from_dlpack(module.rhs_batch(0.0, x, device="gpu", precision="single"))
     wanted = module.rhs_batch(0.0, np.asarray(x, dtype=float))
+    with pytest.raises(ArgumentError, match="out is an array of JAX, which counts on its arrays never to change; leave out away"):
+        module.rhs_batch(0.0, x, out=x, device="gpu", precision="single")
     assert found.dtype == "float32" and np.abs(np.asarray(found) - wanted).max() < SINGLE * np.abs(wanted).max()
 
 

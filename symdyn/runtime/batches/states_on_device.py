@@ -12,12 +12,14 @@ from symdyn.errors import ArgumentError, CompileError
 from symdyn.runtime.batches.precision import PRECISIONS
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.gpu.device import Device
-from symdyn.runtime.gpu.dlpack import DeviceArray, View, demand_rows, is_on, view
+from symdyn.runtime.gpu.dlpack import DeviceArray, View, demand_rows, is_on, overlap, view
 from symdyn.runtime.gpu.states import GROUPS, Kernels, rates, rates_there
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
+# Libraries whose arrays never change.
+CONSTANT = ("jax", "jaxlib")
 Taken = Callable[[Mapping[str, Any]], tuple[int, dict[str, np.ndarray]]]
 
 
@@ -74,9 +76,18 @@ def _there(module: Module, device: Device, kernels: Kernels, unit: Any, values: 
     if out is not None:
         if not is_on(out, *device.where):
             raise ArgumentError(f"{name}: x lies on the device and out does not; give an array there, or leave out away")
+        if type(out).__module__.partition(".")[0] in CONSTANT:
+            raise ArgumentError(f"{name}: out is an array of JAX, which counts on its arrays never to change; leave out away, "
+                                "and take the result by jax.dlpack.from_dlpack")
         to = view(out, handle, kernels.dtype, name, "out")
         if to.shape != (n, sizes.x):
             raise ArgumentError(f"{name}: out has the shape {to.shape} on the device, needed is ({n}, {sizes.x})")
+        # A thread reads all of its state before it writes: out may be x itself.
+        shared = [g for g, v in views.items() if overlap(v, to, kernels.dtype.itemsize)
+                  and (g != "x" or (v.address, v.strides) != (to.address, to.strides))]
+        if shared:
+            raise ArgumentError(f"{name}: out and {', '.join(shared)} share memory on the device, where it would be read after "
+                                "it was written; give another array, or x itself")
     made, codes = rates_there(device, kernels, n, {g: views.get(g, arrays[g]) for g in GROUPS}, to, name)
     return out if made is None else made, _reasons(unit, codes), n, np.zeros((0, sizes.x))
 

@@ -91,6 +91,15 @@ def view(values: Any, stream: int | None, dtype: np.dtype, owner: str, what: str
     return View(int(tensor.data or 0) + tensor.byte_offset, shape, strides, capsule)
 
 
+def overlap(a: View, b: View, size: int) -> bool:
+    """Whether the memory that two arrays reach over has a part in common; size: of a number."""
+    ranges = []
+    for one in (a, b):
+        steps = [(n - 1) * stride * size for n, stride in zip(one.shape, one.strides, strict=True)]
+        ranges.append((one.address + sum(min(0, s) for s in steps), one.address + size + sum(max(0, s) for s in steps)))
+    return ranges[0][0] < ranges[1][1] and ranges[1][0] < ranges[0][1] and 0 not in (*a.shape, *b.shape)
+
+
 _exported: dict[int, tuple[Any, ...]] = {}
 _numbers = itertools.count(1)
 
