@@ -21,6 +21,7 @@ from symdyn.ensembles import chunk, plan, portable, store
 from symdyn.ensembles.archive import thinned
 from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
+from symdyn.ensembles.measures import take_measures
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
 from symdyn.runtime.building import texts
@@ -582,9 +583,23 @@ def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeyp
 
 @pytest.mark.parametrize("name, options, expected", [
     ("double_pendulum", {"rtol": 1e-6}, True), ("double_pendulum", {"max_steps": 5}, False), ("four_bar", {}, True),
-    ("four_bar", {"stabilization": "none"}, False)])
+    ("four_bar", {"stabilization": "none"}, False), ("double_pendulum", {"method": "bs54"}, True),
+    ("double_pendulum", {"method": "radau"}, False)])
 def test_vectors_serve_where_they_take_the_same_steps(name, options, expected):
-    assert chunk.vectors_serve(recall(name, {}), False, options) is expected
+    assert chunk.vectors_serve(recall(name, {}), False, options, ()) is expected
+
+
+def test_vectors_serve_events_that_outcomes_need_no_times_of():
+    z = sd.coordinates("z")
+    served = []
+    for stop in (False, True):
+        system = sd.System("ball", gravity=[0, 0, -10])
+        system.add_joint(sd.Prismatic("fall", system.ground, system.add_body("ball", mass=1), z, axis=[0, 0, 1]))
+        system.add_event("floor", z, direction=-1, stop=stop, reset={} if stop else {z.dot: -z.dot / 2})
+        module = system.embedding().compile(backend="c")
+        served += [chunk.vectors_serve(module, False, options, take_measures(outcomes, module)) for options, outcomes in (
+            ({}, ["end z"]), ({}, ["end z", "mean energy"]), ({"events": False}, ["mean energy"]))]
+    assert served == [True, False, True, False, False, True]
 
 
 # -- far tails and larger counts
