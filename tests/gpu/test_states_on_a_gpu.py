@@ -3,8 +3,13 @@ of other libraries in and out."""
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import gc
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -16,9 +21,12 @@ import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.single import in_single
 from symdyn.errors import ArgumentError, CompileError, EvaluationWarning, UnsupportedExpression
+from symdyn.runtime.building import cache
+from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.gpu import compiling, device, states
 from symdyn.runtime.gpu.dlpack import DeviceArray
 
+HERE = Path(__file__).parent
 N = 50
 # A norm-wise bound of errors in single precision, whose rounding is 6e-8, for states of the size 1.
 SINGLE = 2e-5
@@ -289,3 +297,43 @@ def test_functions_of_the_user_that_are_no_cuda_are_named() -> None:
             module.rhs_batch(0.0, [[2.0, 0.0]], device="gpu")
         with pytest.raises(CompileError, match=r"calls functions of the user in C, pull\(x\)"):
             module.simulate_batch({"x": [1.0]}, t=(0, 1), device="gpu")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the driver of this test is a library of Linux")
+def test_the_drivers_calls(tmp_path: Path) -> None:
+    """A driver whose memory and kernels are this processor's stands in for CUDA's, with arrays that are on it."""
+    pytest.importorskip("cuda.bindings")
+    module = compiled("double_pendulum")
+    unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False))
+    compiling.cubin(unit.source, module.name, "sm_90")  # kept in the cache: the compiler looks for a driver, too
+    driver = tmp_path / "libcuda.so.1"
+    subprocess.run([*require_compiler().command, "-shared", "-fPIC", f"-DSIZE={ctypes.sizeof(states.StateRows)}", "-o",
+                    str(driver), str(HERE / "fake_driver.c"), "-ldl"], check=True)
+    program = """
+import ctypes, gc, numpy as np, symdyn as sd
+module = sd.systems.get("double_pendulum").compile(backend="c")
+x = np.random.default_rng(1).normal(size=(100, 4))
+here = module.rhs_batch(0.0, x)
+assert np.array_equal(module.rhs_batch(0.0, x, device="gpu"), here)
+class There:
+    def __dlpack__(self, stream):
+        assert stream > 2  # no default stream
+        return x.__dlpack__()
+    def __dlpack_device__(self):
+        return 2, 0
+made = module.rhs_batch(0.0, There(), device="gpu")
+assert made.__dlpack_device__() == (2, 0) and np.array_equal(made.to_numpy(), here)
+counts = (ctypes.c_longlong * 4)()
+fake = ctypes.CDLL("libcuda.so.1")
+fake.fake_counts(counts)
+print(*counts)
+del made
+gc.collect()
+fake.fake_counts(counts)
+print(*counts)
+"""
+    environment = {**os.environ, "LD_LIBRARY_PATH": str(tmp_path),
+                   "FAKE_KERNELS": str(cache.build(unit.source, module.name, require_compiler()))}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    # Blocks, modules and streams that are left, and kernels that ran: constants and states, twice.
+    assert done.stdout.splitlines() == ["1 0 0 4", "0 0 0 4"] and not done.stderr, done.stderr
