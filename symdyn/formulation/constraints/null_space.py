@@ -189,3 +189,32 @@ def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[i
         filled[waiting & filled[:, j]] |= filled[i]
         A[waiting, j] = 0.0
     return pivots
+
+
+def least_operations(structure: np.ndarray, mass: np.ndarray, pivots: Sequence[tuple[int, int]]) -> int:
+    """No more operations than elimination with these pivots takes: those of Z^T M Z, without what ones in Z save, and of its
+    factors.
+
+    structure (m, n), mass (n, n): where C and M are not zero by structure
+    """
+    rows, dependent = [r for r, _ in pivots], [c for _, c in pivots]
+    free = [k for k in range(structure.shape[1]) if k not in set(dependent)]
+    left, right = structure[np.ix_(rows, dependent)].copy(), structure[np.ix_(rows, free)].copy()
+    for k in range(len(rows)):
+        below = k + 1 + np.flatnonzero(left[k + 1:, k])
+        left[below] |= left[k]
+        right[below] |= right[k]
+    for k in range(len(rows) - 1, -1, -1):
+        right[np.flatnonzero(left[:k, k])] |= right[k]
+    Z = np.zeros((structure.shape[1], len(free)), dtype=np.float32)
+    Z[free, range(len(free))] = 1
+    Z[dependent] = right
+    MZ = (mass.astype(np.float32) @ Z > 0).astype(np.float32)
+    near = Z.T @ MZ > 0
+    products = np.tril(Z[dependent].T @ MZ[dependent])
+    operations = int(np.maximum(2 * products - 1, 0).sum())
+    for k in range(len(free) - 1, -1, -1):  # as the factors are made, from the last to the first
+        others = np.flatnonzero(near[k, :k])
+        near[np.ix_(others, others)] = True
+        operations += len(others) * (len(others) + 1) // 2
+    return operations

@@ -12,7 +12,7 @@ import numpy as np
 
 from symdyn.errors import ModelWarning
 from symdyn.formulation.constraints.motion import Constrained
-from symdyn.formulation.constraints.null_space import elimination_order
+from symdyn.formulation.constraints.null_space import elimination_order, least_operations
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.dependent_rows import Ranks
@@ -26,6 +26,8 @@ Rows = tuple[int, ...]
 Pivots = tuple[tuple[int, int], ...]
 # Orders of elimination that are compared, each the best at one state.
 CANDIDATES = 8
+# Elimination is not derived where the least that it takes is so many times what another way takes.
+MARGIN = 2
 
 
 def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
@@ -48,10 +50,16 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     ways: dict[str, Q] = {}
     if not singular(quantities):
         ways["Schur complement of the mass matrix"] = derivation(False, independent, None)
-    pivots = _pivots(quantities, found)
+    counts = {name: operations(way) for name, way in ways.items()}
+    pivots, least = _pivots(quantities, found, min(counts.values(), default=None))
+    others: list[str] = []
+    if least:
+        others.append(f"elimination of dependent speeds, {least} at least")
     if pivots is not None:
         dependent = ", ".join(str(quantities.speeds[column]) for _, column in pivots)
-        ways[f"elimination of the dependent speeds {dependent}"] = derivation(False, independent, pivots)
+        name = f"elimination of the dependent speeds {dependent}"
+        ways[name] = derivation(False, independent, pivots)
+        counts[name] = operations(ways[name])
     notes = list(remarks)
     if independent is not None and found is not None:
         left = [r.name for k, r in enumerate(rows) if k not in independent]
@@ -60,9 +68,8 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     if not ways:
         notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
         return replace(whole, notes=(*whole.notes, *notes))
-    counts = {name: operations(way) for name, way in ways.items()}
     best = min(counts, key=lambda name: counts[name])
-    others = [f"{name}, {count}" for name, count in counts.items() if name != best]
+    others = [f"{name}, {count}" for name, count in counts.items() if name != best] + others
     others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
     notes.append(f"accelerations by {best}: {counts[best]} operations ({'; '.join(others)})")
     chosen = result(ways[best], whole)
@@ -108,20 +115,26 @@ def singular(quantities: Constrained) -> bool:
     return any(is_zero(M[k, k]) for k in range(len(M))) or first_dependent(quantities.algebra.recorder, M) is not None
 
 
-def _pivots(quantities: Constrained, found: Ranks | None) -> Pivots | None:
-    """Dependent speeds and their order, where the sample state allows it."""
+def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) -> tuple[Pivots | None, int]:
+    """Dependent speeds and their order, where the sample state allows it; none, and how many operations it takes at least,
+    where these are many more than the fewest of other ways."""
     if found is None or not found.independent:
-        return None
+        return None, 0
     kept = list(found.independent)
     C_r = quantities.C_r()[kept]
     structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
     if not _holds(found, kept):
-        return None
+        return None, 0
     samples = found.samples[:, kept]
     orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)]
               if (order := elimination_order(A, structure)) is not None}
     if not orders:
-        return None
+        return None, 0
+    M = quantities.recall("M_tilde")
+    mass = np.array([[not is_zero(e) for e in row] for row in M], dtype=bool).reshape(M.shape)
+    least = min(least_operations(structure, mass, order) for order in sorted(orders))
+    if fewest is not None and least > MARGIN * fewest:
+        return None, least
     whole = np.linalg.svd(samples, compute_uv=False)[:, -1]
 
     def usual(order: tuple[tuple[int, int], ...]) -> float:
@@ -130,7 +143,7 @@ def _pivots(quantities: Constrained, found: Ranks | None) -> Pivots | None:
         return float(np.quantile(part / whole, 0.1))
 
     best = max(sorted(orders), key=usual)
-    return tuple((kept[row], column) for row, column in best)
+    return tuple((kept[row], column) for row, column in best), 0
 
 
 def _holds(found: Ranks, kept: list[int]) -> bool:
