@@ -83,6 +83,18 @@ def test_stiff_motion_is_that_of_dense_factors(cable: Any, method: str, work: bo
         assert found.energy_error() <= 1e-5
 
 
+@needs_c
+def test_inputs_that_vary() -> None:
+    system = elastic_cable(30)
+    pushes = sd.inputs("F1 F2")
+    for joint, push in zip(("up10", "up20"), pushes, strict=True):
+        system.add_joint_force(joint, push)
+    module = system.embedding().compile()
+    given = {"inputs": lambda t, x: [np.sin(100 * t), 2.0], "rtol": 1e-8, "atol": 1e-10}
+    found = [module.simulate([0, 0.02], method=method, **given).q[-1] for method in ("Radau", "radau5")]
+    assert module.places_of_jacobian().sparse and np.abs(found[0] - found[1]).max() <= 1e-8
+
+
 def test_dense_matrices_that_are_too_large_are_refused(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "LARGEST_MATRICES", 8 * 116**2 * 5 - 1)
     if cable.backend == "c":

@@ -127,7 +127,7 @@ class SparseJacobian:
         from scipy.sparse import csc_matrix
 
         n, there = self.request.n_state, self.there
-        values, rows, columns = self.evaluator.one(t, x[:n], inputs or None), there.rows, there.columns
+        values, rows, columns = self.evaluator.one(t, x[:n], inputs if len(inputs) else None), there.rows, there.columns
         if len(x) > n:
             work = self.module.evaluate("power_x", t, x[:n], self.request.p, inputs)
             values, rows, columns = np.r_[values, work], np.r_[rows, np.full(n, n)], np.r_[columns, np.arange(n)]
