@@ -18,12 +18,11 @@ import pytest
 
 import symdyn as sd
 from tests.checks import public_names, walk
+from tests.checks.every_page import Watched
 from tests.helpers import CONTRAST, browser
 from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
-# As wide as screens, with and without the contents of a page at its side, and as a telephone.
-WIDTHS = 1400, 1280, 1100, 400
 PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "tutorials/wheel_on_a_road",
          "describing_mechanisms", "printing", "measured", "gallery", "gallery/puma560", "gallery/bicycle",
          "reference/system", "reference/module", "contributing", "genindex")
@@ -94,18 +93,33 @@ def test_docstrings_are_typeset(site: Path) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_work_without_a_network(site: Path, shown: Any, name: str) -> None:
-    """No request beyond the disk, nothing on the console, nothing wider than the window."""
-    for width in WIDTHS:
-        page = shown.new_page(viewport={"width": width, "height": 900})
-        asked: list[str] = []
-        said: list[str] = []
-        page.on("request", lambda request, asked=asked: asked.append(request.url))
-        page.on("console", lambda message, said=said: said.append(message.text))
-        page.on("pageerror", lambda error, said=said: said.append(str(error)))
-        page.goto((site / f"{name}.html").as_uri())
-        assert all(url.startswith(("file:", "data:")) for url in asked) and not said, (asked, said)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        page.close()
+    """No request beyond the disk, nothing on the console, nothing wider than its box or the window; tests/checks/every_page.py
+    opens all of them."""
+    watched = Watched(shown)
+    assert [*watched.open(site / f"{name}.html"), *watched.wider()] == []
+    watched.page.close()
+
+
+def test_faults_of_pages_are_found(shown: Any, tmp_path: Path) -> None:
+    """Each of the checks of pages finds its fault."""
+    page = tmp_path / "page.html"
+    page.write_text("""<!doctype html><style>a { display: block; outline: none !important; }</style>
+        <body style="background: white"><div class="content" style="width: 300px"><img src="http://127.0.0.1:8099/x.png" alt="">
+        <p style="color: #909090">grey</p><p style="width: 320px">broad</p>
+        <p style="overflow: hidden; width: 50px">incomprehensible</p>
+        <div style="overflow: auto; width: 200px"><pre style="width: 900px">scrolls</pre></div>
+        <div style="width: 1300px; height: 9px; position: absolute"></div><a href="#">plain</a>
+        <button onfocus="this.blur()" id="shy">shy</button></div><script>console.log("talk")</script>""", encoding="utf-8")
+    watched = Watched(shown)
+    opened = list(watched.open(page))
+    assert opened[0] == "requested: http://127.0.0.1:8099/x.png" and "on the console: talk" in opened
+    wider = list(watched.wider())
+    assert {one.rpartition(": ")[2] for one in wider if "1400 pixels" in one} == {"broad", "incomprehensible", ""}
+    assert "wider than a window of 400 pixels" in wider and "wider than a window of 1400 pixels" not in wider
+    assert [one.split()[-2] for one in watched.unreadable()] == ["grey", "grey"]
+    assert list(watched.unreached()) == ['not reached by Tab: <button onfocus="this.blur()" id="shy">shy</button>',
+                                         'without an outline: <a href="#">plain</a>']
+    watched.page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -135,20 +149,10 @@ def test_text_that_cannot_be_read_is_found(shown: Any) -> None:
 @pytest.mark.parametrize("name", ["index", "gallery", "gallery/puma560", "reference/module", "tutorials/robot_arm_from_urdf"])
 def test_the_keyboard_reaches_everything(site: Path, shown: Any, name: str) -> None:
     """Tab goes to every link, button and field of a page that is seen, in a cycle, and each has an outline then."""
-    page = shown.new_page(viewport={"width": 1400, "height": 900})
-    page.goto((site / f"{name}.html").as_uri())
-    page.evaluate("""() => { window.reached = new Set(); window.unseen = new Set();
-        window.reachable = [...document.querySelectorAll("a[href], button, input, select, summary, iframe, [tabindex]")].filter(
-            e => e.checkVisibility({ visibilityProperty: true }) && e.tabIndex >= 0 && !e.disabled); }""")
-    count = page.evaluate("reachable.length")
-    assert count > 20
-    for _ in range(count + 60):  # what an embedded page has is passed as well
-        page.keyboard.press("Tab")
-        page.evaluate("""() => { const e = document.activeElement, style = getComputedStyle(e); reached.add(e);
-            if (reachable.includes(e) && e.tagName !== "IFRAME" && style.outlineStyle === "none") unseen.add(e); }""")
-    for faulty in ("reachable.filter(e => !reached.has(e))", "[...unseen]"):
-        assert page.evaluate(f"{faulty}.map(e => e.outerHTML.slice(0, 120))") == []
-    page.close()
+    watched = Watched(shown)
+    watched.page.goto((site / f"{name}.html").as_uri())
+    assert list(watched.unreached()) == [] and watched.page.evaluate("reached.size") > 20
+    watched.page.close()
 
 
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.sweep)])
