@@ -171,6 +171,10 @@ def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, shown: Any, r
     for name in names:
         text = (site / "gallery" / f"{name}.html").read_text(encoding="utf-8").replace(' class="short"', "")
         assert '<div class="formula"><math' in text and "<td><p>rhs</p></td>" in text and "x_dot" in text, name
+        view = (site / "_static" / f"{name}.html").read_text(encoding="utf-8")
+        data = json.loads(view.split('type="application/json">')[1].split("</script>")[0].replace("<\\/", "</"))
+        moving = [p["values"]["step"] for p in data["motions"][0]["panels"] if p["title"].startswith("coordinates")]
+        assert max(map(max, moving)) * 65535 > 1e-3, f"{name} stays at rest"
         assert (site / "_static" / f"{name}.c").stat().st_size > 1000 and f"_static/{name}.html#play" in text, name
 
 

@@ -15,6 +15,7 @@ import textwrap
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from views import frame
 
@@ -25,6 +26,10 @@ from symdyn.runtime.solutions.solution import Solution
 from symdyn.viewer.live import mechanism_of
 from symdyn.viewer.still import picture_of
 
+# Starts and inputs of mechanisms that would stay at rest from the initial state of the catalogue, and their text.
+STIRRED: dict[str, tuple[dict[str, Any], str]] = {
+    "floating_crane": ({"q": {"beta": 0.2}}, ", with beta = 0.2 rad (it would stay at rest)"),
+    "floating_wind_turbine": ({"inputs": {"v_w": 8.0}}, ", in a wind v_w of 8 m/s (it would stay at rest without)")}
 # Lines of C that a page shows; the file has all of them.
 LINES = 60
 
@@ -36,10 +41,11 @@ def write(pages: Path, views: Path, name: str) -> None:
     equations = system.equations()
     mechanism, lengths = mechanism_of(model)
     (code,) = emit(equations, "c", ["rhs"], standalone=False, integrator=False).files.values()
-    solution = equations.compile().simulate()
+    stirred, by = STIRRED.get(name, ({}, ""))
+    solution = equations.compile().simulate(**stirred)
     picture = picture_of(mechanism, [shape.record for shape in model.shapes], lengths, name)
-    parts = [f"{name}\n{'=' * len(name)}", _moving(name), _description(name), _equations(system), _numbers(equations, solution),
-             _code(name, code)]
+    parts = [f"{name}\n{'=' * len(name)}", _moving(name), _description(name), _equations(system),
+             _numbers(equations, solution, by), _code(name, code)]
     texts = {views / f"{name}.svg": picture, views / f"{name}.c": code, views / f"{name}.html": solution.view(forces=True).html,
              pages / f"{name}.rst": "\n\n".join(parts) + "\n"}
     scratch = pages / f".{name}.{os.getpid()}"  # another build may read what is there: files are exchanged whole
@@ -71,7 +77,7 @@ def _equations(system: sd.System) -> str:
     return f"Equations\n---------\n\n.. math::\n\n{textwrap.indent(formula, '   ')}"
 
 
-def _numbers(equations: Equations, solution: Solution) -> str:
+def _numbers(equations: Equations, solution: Solution, by: str) -> str:
     report = solution.module.report()
     rows = [(row.function, row.total, row.prologue, row.chain) for row in report.rows]
     motion = [("simulated time, s", f"{solution.t[-1]:g}"), ("method", solution.method), ("steps", solution.n_steps),
@@ -82,7 +88,7 @@ def _numbers(equations: Equations, solution: Solution) -> str:
     return "\n\n".join([
         "Numbers\n-------", f"{equations.formulation} equations: {sizes}.",
         _table(("function", "operations", "prologue", "longest chain"), rows),
-        "The prologue runs once a simulation. The motion above, from the initial state of the catalogue:",
+        f"The prologue runs once a simulation. The motion above, from the initial state of the catalogue{by}:",
         _table(("", ""), motion)])
 
 
