@@ -207,6 +207,30 @@ def test_lines_of_formulas_are_aligned(site: Path) -> None:
     assert four_bar.count('<mtd columnalign="left">') > 4
 
 
+def test_functions_are_set_off_from_their_factors(site: Path, shown: Any) -> None:
+    """R cos γt: a thin space at both sides of the name, none before a parenthesis."""
+    page = shown.new_page()
+    page.goto((site / "tutorials" / "chapter_1_particles.html").as_uri())
+    gaps = page.evaluate("""() => [...document.querySelectorAll("math mo")].filter(e => /^(sin|cos)$/.test(e.textContent)
+        && e.previousElementSibling?.tagName === "mi" && e.nextElementSibling).map(e => {
+            const size = parseFloat(getComputedStyle(e).fontSize), [a, b, c] = [e.previousElementSibling, e, e.nextElementSibling]
+                .map(one => one.getBoundingClientRect());
+            return [(b.left - a.right) / size, (c.left - b.right) / size, c && e.nextElementSibling.textContent]; })""")
+    assert len(gaps) > 1 and all(before > 0.1 and (after > 0.1) == (text[0] != "(") for before, after, text in gaps), gaps
+    assert any(text == "\u03b3" for _, _, text in gaps)
+    page.close()
+
+
+def test_signs_after_formulas_stay_on_their_line(site: Path) -> None:
+    formula = re.compile(r'(<span class="short"><math(?:(?!</math>).)*)?</math>([,.;:!?)\u2019]+)', re.DOTALL)
+    kept = 0
+    for page in site.rglob("*.html"):
+        signs = formula.findall(page.read_text(encoding="utf-8")) if "_static" not in page.parts else []
+        assert all(held for held, _ in signs), page.name
+        kept += len(signs)
+    assert kept > 100
+
+
 def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
     listed = (site / "tutorials.html").read_text(encoding="utf-8")
     for source in sorted((ROOT / "notebooks").glob("*.py")):
