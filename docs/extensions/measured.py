@@ -53,8 +53,8 @@ COMMANDS = {
 # A line with a figure, as the lab prints it: its name, the number, the unit, the bound, whether that is missed.
 FIGURE = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<value>-?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan))"
                     r"(?: (?P<unit>[^\s<>]+))?\s*(?P<bound>(?:<=?|>=) \S+)?\s*(?P<missed>MISSED)?")
-# Columns from which on a table has small letters.
-WIDE = 8
+# Columns from which on a table has small letters, and letters of a cell that gets some width there.
+WIDE, LONG = 8, 40
 
 
 def file_of(name: str) -> Path:
@@ -135,10 +135,12 @@ def table(head: list[str], rows: list[list[str]]) -> nodes.container:
     """A table within the box in which the theme lets it scroll."""
     group = nodes.tgroup("", *[nodes.colspec(colwidth=1) for _ in head], cols=len(head))
     # Quotes and hyphens stay those of what was printed, such as options of commands.
-    line = [nodes.row("", *[nodes.entry("", nodes.paragraph("", cell, support_smartquotes=False)) for cell in cells])
+    wide = len(head) > WIDE
+    line = [nodes.row("", *[nodes.entry("", nodes.paragraph("", cell, support_smartquotes=False),
+                                        classes=["long"] if wide and len(cell) > LONG else []) for cell in cells])
             for cells in (head, *rows)]
     group += [nodes.thead("", line[0]), nodes.tbody("", *line[1:])]
-    classes = ["docutils", "align-default", *(["wide"] if len(head) > WIDE else [])]
+    classes = ["docutils", "align-default", *(["wide"] if wide else [])]
     return nodes.container("", nodes.table("", group, classes=classes), classes=["table-wrapper"])
 
 
