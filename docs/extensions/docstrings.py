@@ -54,7 +54,7 @@ def converted(lines: list[str]) -> list[str]:
             indent = len(block[0]) - len(block[0].lstrip())
             result += [*[line[indent:] for line in block], ""]
         elif all(line.startswith("    ") for line in block):
-            result += ["::", "", *block, ""]
+            result += [".. code-block:: text", "", *block, ""]
         else:
             result += _with_items(block)
     return result
@@ -93,7 +93,7 @@ def _paragraphs(block: list[str]) -> list[str]:
             result += [paragraph(" ".join(plain)), ""]
             plain = []
         if formula:
-            result += ["::", "", line, ""]
+            result += [".. code-block:: text", "", line, ""]
         elif line:
             plain.append(line.strip())
     return result
