@@ -26,11 +26,15 @@ from tests.helpers import swept
 pytest.importorskip("matplotlib")
 image = pytest.importorskip("PIL.Image")
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+
 from symdyn.pictures import animate, plot  # noqa: E402
 from symdyn.pictures.drawing import Drawing  # noqa: E402
 from symdyn.pictures.points import points_of  # noqa: E402
 from symdyn.pictures.scene import Scene  # noqa: E402
 from symdyn.pictures.solids import Solids  # noqa: E402
+from symdyn.pictures.symbols import typeset  # noqa: E402
 
 ROOT = str(Path(symdyn.__file__).parents[1])
 OPTIONS: dict[str, dict[str, Any]] = {"n_link_pendulum": {"n": 3}, "spatial_chain": {"n": 4}, "prismatic_chain": {"n": 3}}
@@ -92,6 +96,15 @@ def test_curves_have_names_and_units(tmp_path: Path) -> None:
     assert "double_pendulum" in figure.get_suptitle()
     with image.open(path) as picture:
         assert picture.width > 800 and len(picture.convert("RGB").getcolors(1 << 24)) > 100
+
+
+@pytest.mark.parametrize(("name", "text"), [
+    ("steer", "steer"), ("steer_dot", r"$\dot{\mathrm{steer}}$"), ("hub_yaw_ddot", r"$\ddot{\mathrm{hub\_yaw}}$"),
+    ("theta_2_dot", r"$\dot{\theta}_{2}$"), ("a b_dot", "a b_dot")])
+def test_rates_have_dots(name: str, text: str) -> None:
+    """Also those of words, which matplotlib can set."""
+    assert typeset(name) == text
+    Figure().text(0.5, 0.5, typeset(name)).get_window_extent(FigureCanvasAgg(Figure()).get_renderer())
 
 
 def test_each_unit_has_its_axes_and_inputs_are_shown() -> None:
