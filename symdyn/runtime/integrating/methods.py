@@ -73,12 +73,12 @@ def _not_collocated(module: Module, inputs: Inputs | None) -> str:
     return _constrained(module) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
-def _dense(stages: int) -> Callable[[Module, Request], str]:
+def _dense(stages: int) -> Callable[[Module, Inputs | None], str]:
     """Matrices of the compiled implicit methods have all entries: that of the derivative, and a real and an imaginary part for
     each two stages."""
 
-    def unfit(module: Module, request: Request) -> str:
-        n = len(request.x0)
+    def unfit(module: Module, inputs: Inputs | None) -> str:
+        n = module.metadata.sizes.x
         size = 8 * n**2 * (stages + 2)
         if size <= LARGEST_MATRICES:
             return ""
