@@ -155,3 +155,40 @@ def test_derivatives_of_where_a_table_comes_to_rest_that_slides_and_spins() -> N
         difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / 12e-4
         assert abs(run.sensitivity[name][-1, 0] - difference) < 1e-9
         assert abs(found[name] - difference) < 1e-9
+
+
+def _pushed_table() -> Module:
+    """A table on three legs that is pushed at its centre of mass."""
+    system = sd.System("table", gravity=[0, 0, -9.81])
+    F, = sd.parameters("F,")
+    top = system.add_body("top", mass=10, inertia=[1, 1, 1.5])
+    system.add_joint(sd.Free("float", system.ground, top, orientation=sd.EulerParameters()))
+    system.add_force(top, [F, 0, 0])
+    for k in range(3):
+        at = [0.5 * np.cos(2 * np.pi * k / 3), 0.5 * np.sin(2 * np.pi * k / 3), -0.3]
+        system.add_contact(sd.Contact(f"leg{k}", top, system.ground, shape=sd.contacts.Point(at), friction=0.4))
+    return system.compile()
+
+
+def test_the_legs_of_a_table_come_to_rest_at_once() -> None:
+    """Pushed tables stop at v (mu g + f cos phi) / ((mu g)^2 - f^2), f = F/m, phi between F and v, on all three legs."""
+    module = _pushed_table()
+    rng, grip = np.random.default_rng(3), 0.4 * 9.81
+    for _ in range(12):
+        v, f = rng.normal(size=2) * 0.5, rng.uniform(0, 0.8) * grip
+        solution = module.simulate((0, 2), q=[0, 0, 0.3, 1, 0, 0, 0], u=[*v, 0, 0, 0, 0], params={"F": 10 * f}, rtol=1e-9,
+                                   atol=1e-12, max_steps=5000)
+        stops = (np.hypot(*v) * grip + f * v[0]) / (grip**2 - f**2)
+        assert solution.success, solution.message
+        for k in range(3):
+            t, mode = solution.contacts[f"leg{k}"].switches[-1]
+            assert mode == "sticking" and abs(t - stops) < 1e-8
+
+
+def test_a_table_that_falls_onto_a_leg_comes_to_rest() -> None:
+    """Tilted by a millionth about the edge of two legs, and pushed below the limit of friction."""
+    module = _pushed_table()
+    q = [0, 0, 0.3 + 0.25e-6, np.cos(0.5e-6), 0, -np.sin(0.5e-6), 0]
+    solution = module.simulate((0, 0.4), q=q, params={"F": 30.0}, rtol=1e-8, max_steps=5000)
+    assert solution.success, solution.message
+    assert [solution.contacts[f"leg{k}"].mode[-1] for k in range(3)] == ["sticking"] * 3

@@ -862,6 +862,8 @@ class _Phases:
                 if not self.still[k] and size <= TOLERATED * tolerated and self.done:  # nor has one that turns near them
                     begin = self.done[-1]
                     self.still[k] = self._slip(float(begin.t[0]), begin.x[0], k) <= TOLERATED * tolerated
+        if any(self.still[k] for k, what in fired if what in ("sticks", "turns")):
+            self._stop_together(t, x)
         self.made = [Made(tuple(self.modes), tuple(self.still))]
         x = self._onto_surfaces(t, x)
         at = self._numbers(t, x)
@@ -912,6 +914,13 @@ class _Phases:
         self.left |= {k: t for k in closed if self.modes[k] == OPEN}
         self._pass_by(t, x, [self.passed[k] if k in turned else now for k, now in enumerate(self._ignored(t, x))])
         return x
+
+    def _stop_together(self, t: float, x: np.ndarray) -> None:
+        """Where a slip has come to its end, others in space that are near the tolerances have come to theirs: legs of one body,
+        of which rounding lets one be the first."""
+        for k, (mode, record) in enumerate(zip(self.modes, self.records, strict=True)):
+            if mode == SLIDING and record.tangents == 2 and not self.still[k]:
+                self.still[k] = self._slip(t, x, k) <= TOLERATED * self._tolerated(t, x, k)
 
     def _is_leaving(self, k: int, t: float, x: np.ndarray, at: Numbers) -> bool:
         """Whether a contact has just opened: its gap is rounding, which may pass zero, and no speed closes it."""
