@@ -9,7 +9,7 @@ import time as clock
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,6 +18,11 @@ from symdyn.errors import ArgumentError
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+    from symdyn.runtime.module import Module
 
 SIZES = (10, 100, 1000)
 # A cable of 1 m and 1 kg between supports 1 m apart: weight, stretched by its stiffness EA (N) under the tension T (N) of the
@@ -121,13 +126,14 @@ def measure(n: int) -> list[Row]:
 # -- at rest
 
 
-def at_rest(module: Any) -> tuple[np.ndarray, Any]:
+def at_rest(module: Module) -> tuple[np.ndarray, csc_matrix]:
     """The coordinates of a cable at rest, by Newton's iteration from where it starts, and the derivative of its accelerations by
     them there, a sparse matrix."""
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
     places, n = module.places_of_jacobian(), module.metadata.sizes.q
+    assert places is not None
     own = (places.rows >= n) & (places.columns < n)
     q = np.array([module.metadata.initial.get(name, 0.0) for name in module.metadata.q])
     for _ in range(30):
@@ -141,7 +147,7 @@ def at_rest(module: Any) -> tuple[np.ndarray, Any]:
     return q, slope
 
 
-def frequencies(slope: Any, count: int = 5) -> np.ndarray:
+def frequencies(slope: csc_matrix, count: int = 5) -> np.ndarray:
     """The lowest ones, rad/s."""
     from scipy.sparse.linalg import eigs
 
