@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 from typing import Any
 
 import numpy as np
 
+import symdyn as sd
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
+
+
+@functools.cache
+def compiled(name: str) -> Any:
+    """A mechanism of the catalogue in C."""
+    return sd.systems.get(name).compile(backend="c")
 
 
 class HostDevice:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from host_device import HostDevice
+from host_device import HostDevice, compiled
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
@@ -25,24 +25,11 @@ from symdyn.ensembles.sweep_file import read_sweep
 from symdyn.errors import ArgumentError, CompileError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.gpu import compiling, device
+from symdyn.runtime.gpu import compiling
 from symdyn.runtime.gpu.motions import Motions
 from tests.runtime.constrained import module as constrained
 
 HERE = Path(__file__).parent
-
-
-@functools.cache
-def compiled(name: str) -> Any:
-    return sd.systems.get(name).compile(backend="c")
-
-
-@pytest.fixture
-def host(monkeypatch: pytest.MonkeyPatch) -> HostDevice:
-    """What stands for every GPU."""
-    made = HostDevice(threads=8)
-    monkeypatch.setattr(device, "open_device", lambda number, owner: made)
-    return made
 
 
 def swings(n: int) -> dict[str, Any]:

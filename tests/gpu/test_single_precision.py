@@ -3,33 +3,19 @@ forms, and as code of a GPU."""
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
 import pytest
-from host_device import HostDevice
+from host_device import HostDevice, compiled
 from scipy.special import ellipj, ellipk
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime.gpu import compiling, device
+from symdyn.runtime.gpu import compiling
 
 EPS = 6e-8  # the rounding of single precision
-
-
-@functools.cache
-def compiled(name: str) -> Any:
-    return sd.systems.get(name).compile(backend="c")
-
-
-@pytest.fixture
-def host(monkeypatch: pytest.MonkeyPatch) -> HostDevice:
-    """What stands for every GPU."""
-    made = HostDevice(threads=8)
-    monkeypatch.setattr(device, "open_device", lambda number, owner: made)
-    return made
 
 
 def mover(force: Any = 0) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from host_device import HostDevice
+from host_device import HostDevice, compiled
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
@@ -30,19 +30,6 @@ HERE = Path(__file__).parent
 N = 50
 # A norm-wise bound of errors in single precision, whose rounding is 6e-8, for states of the size 1.
 SINGLE = 2e-5
-
-
-@functools.cache
-def compiled(name: str) -> Any:
-    return sd.systems.get(name).compile(backend="c")
-
-
-@pytest.fixture
-def host(monkeypatch: pytest.MonkeyPatch) -> HostDevice:
-    """What stands for every GPU."""
-    made = HostDevice(threads=8)
-    monkeypatch.setattr(device, "open_device", lambda number, owner: made)
-    return made
 
 
 class There:
