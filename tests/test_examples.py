@@ -6,6 +6,7 @@ import doctest
 import functools
 import importlib
 import inspect
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -66,7 +67,7 @@ def documented() -> Iterator[tuple[str, Any]]:
 
 def _members(path: str, owner: Any, options: dict[str, tuple[str, ...]]) -> Iterator[tuple[str, Any]]:
     module = inspect.ismodule(owner)
-    names = options["members"] or (getattr(owner, "__all__", None) if module else None) or vars(owner)
+    names = options["members"] or (getattr(owner, "__all__", None) if module else None) or _own(owner, options)
     for name in names:
         thing = inspect.getattr_static(owner, name)
         if name.startswith("_") or name in options.get("exclude-members", ()) or not _behaves(thing):
@@ -76,6 +77,15 @@ def _members(path: str, owner: Any, options: dict[str, tuple[str, ...]]) -> Iter
         yield f"{path}.{name}", thing
         if module and inspect.isclass(thing):
             yield from _members(f"{path}.{name}", thing, {**options, "members": ()})
+
+
+def _own(owner: Any, options: dict[str, tuple[str, ...]]) -> list[str]:
+    """Names that a module or class defines, and those that it inherits from the classes before the one that is named."""
+    if "inherited-members" not in options:
+        return list(vars(owner))
+    up_to = {"object", *options["inherited-members"]} - {owner.__name__}
+    classes = itertools.takewhile(lambda one: one.__name__ not in up_to, owner.__mro__)
+    return list(dict.fromkeys(name for one in classes for name in vars(one)))
 
 
 def _behaves(thing: Any) -> bool:

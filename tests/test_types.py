@@ -15,6 +15,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.ensembles import Ensemble
+from symdyn.facade import EquationsFacade, MotionFacade, SystemFacade
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.printed.independent_speeds import MotionEquations
@@ -109,7 +110,8 @@ def test_an_editor_shows_signatures_with_defaults(jedi: ModuleType) -> None:
 
 
 RETURNED = (Module, Solution, BatchSolution, Equations, MotionEquations, AugmentedEquations, Equilibrium, Equilibria,
-            Linearization, Modes, Mode, Stability, Campbell, Regulator, Actuation, Ensemble)
+            Linearization, Modes, Mode, Stability, Campbell, Regulator, Actuation, Ensemble, SystemFacade, EquationsFacade,
+            MotionFacade)
 # Where no type says it: one symbol or a tuple of them, by the text; entries of SymPy or of nested lists; a matrix, or one with
 # intermediates; a comparison or several of them, by the text; what a scalar of a derivation may be; a client of dask, mpi4py
 # or concurrent.futures.

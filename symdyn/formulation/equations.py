@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import sympy as sp
 from symdyn.collector import collector_paused
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, SymdynError
+from symdyn.facade import EquationsFacade
 from symdyn.kinds import flag, text
 from symdyn.shown import shown
 from symdyn.tape.node import ACCELERATION, Node
@@ -24,20 +24,9 @@ from symdyn.tape.tape import Tape
 _UNREADABLE = 50_000
 
 if TYPE_CHECKING:
-    from pathlib import Path
 
-    import casadi
-    import jax
-    import torch
 
-    from symdyn.analytic.units import UnitReport
-    from symdyn.exact.mechanism import Proofs
-    from symdyn.formulation.identification.quantities import BaseParameters
-    from symdyn.given import Numbers, PathName, Rolling
-    from symdyn.report.latex import Typeset
-    from symdyn.runtime.module import Module
-    from symdyn.sympy_mechanics.back import SympyEquations
-    from symdyn.verification import Verification
+    pass
 
 
 def _derived_again(again: Callable[[], Equations], simplify_seconds: float, candidates: tuple[Any, ...]) -> Equations:
@@ -67,7 +56,7 @@ class Symbols:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(EquationsFacade):
     """Equations of motion whose quantities are recorded on one tape when they are asked for.
 
     name         of the mechanism; formulation: how it was derived
@@ -277,22 +266,6 @@ class Equations:
             return {}
         return dict(zip(self.identification.base.names, self.quantity("base_parameters").tolist(), strict=True))
 
-    def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
-              simplify: bool = True) -> Typeset:
-        """A quantity in LaTeX as the lecture writes it; prints and shows in notebooks.
-
-        shorthand       s_1 for sin q_1, c_12 for cos(q_1 + q_2), with a legend
-        intermediates   steps that the derivation names (velocities, forces, inertias of links) stand before the quantity
-        width           letters in a line: wider matrices get named entries below them, longer sums several lines
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> print(equations.latex("M_tilde"))
-        \\tilde{\\mathbf{M}} = \\left[\\begin{matrix}l^{2} m\\end{matrix}\\right]
-        """
-        from symdyn.report.latex import equations_latex
-
-        return equations_latex(self, name, shorthand, intermediates, width, simplify)
-
     def printed_leaves(self) -> dict[Node, sp.Basic]:
         """Leaf of the tape -> the symbol it is printed as: its own, where others stand for the same value.
 
@@ -321,221 +294,6 @@ class Equations:
         Matrix([[q1_ddot]])
         """
         return sp.Matrix(len(self.symbols.speeds), 1, [u.dot for u in self.symbols.speeds])
-
-    def lambdify(self, name: str) -> Callable[..., np.ndarray]:
-        """One quantity, such as "M_tilde", as a NumPy function f(q, u, params, t=0, inputs=(), ud=()).
-
-        It takes one state or arrays of states; params as everywhere in Module. Raises SymdynError for an unknown name.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.lambdify("M_tilde")([0.1], params=[1.0, 1.0, 9.81]).shape
-        (1, 1)
-        """
-        return self.compile(backend="numpy").function(name)
-
-    def compile(self, backend: str | None = None, templates: str | os.PathLike[str] | None = None,
-                specialize: Numbers | None = None, rolled: Rolling = "auto") -> Module:
-        """A numeric module.
-
-        backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
-        templates    folder whose templates take precedence
-        specialize   parameters, by symbol or name, that become numbers in the code and are folded
-        rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False;
-                     `module.report` says which
-
-        Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code, SymdynError for
-        loops with the backend "numpy", which has none.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.compile(backend="numpy").name
-        'pendulum'
-        """
-        from symdyn.pipeline import compile_equations
-
-        return compile_equations(self, backend, templates, specialize, rolled)
-
-    def write(self, folder: str | os.PathLike[str], backend: str = "c", functions: Sequence[str] | None = None,
-              templates: str | os.PathLike[str] | None = None, specialize: Numbers | None = None,
-              integrator: bool = True, work: bool = False, baumgarte: bool = False, batch: bool = False,
-              method: str = "dop853") -> list[Path]:
-        """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
-
-        backend      "c", "numpy", "fortran", "julia", "matlab", "rust", or one of your own templates
-        functions    names of what is written; default: the usual ones that the formulation has
-        templates    folder whose templates take precedence
-        specialize   parameters, by symbol or name, that become numbers in the code and are folded
-        integrator   C only: with an integrator of rhs, by the compiled method of this name: `method`
-        work         rhs gets one more state at the end: the work of all loads but gravity and springs
-        baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
-        batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
-
-        Raises SymdynError for an unknown function, parameter, backend or method, or a broken template.
-
-        >>> import tempfile
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> sorted(path.name for path in equations.write(tempfile.mkdtemp(), backend="numpy"))
-        ['pendulum.py']
-        """
-        from symdyn.pipeline import emit, write_source
-        from symdyn.runtime.paths import as_path, writing
-
-        target = as_path(folder, "of the folder to write to", "generated/arm")
-        source = emit(self, backend, functions, templates, integrator=integrator, specialize=specialize, work=work,
-                      baumgarte=baumgarte, batch=batch, method=method)
-        with writing(target):
-            return write_source(source, target)
-
-    def base_parameters(self) -> BaseParameters:
-        """The smallest set of inertial parameters that the equations depend on.
-
-        See symdyn.formulation.identification.quantities.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.base_parameters()
-        <2 base parameters of pendulum>
-        """
-        from symdyn.formulation.identification.quantities import base_parameters
-
-        return base_parameters(self)
-
-    def verify(self, states: int = 5, digits: int = 30, params: Numbers | None = None) -> Verification:
-        """Prove the equations sound by identities at random states; see symdyn.verification.verify.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.verify(states=2).passed
-        True
-        """
-        from symdyn.verification import verify
-
-        return verify(self, states, digits, params)
-
-    def prove(self, other: Equations | None = None) -> Proofs:
-        """Decide identities of the equations by exact algebra, for every state; see symdyn.exact.mechanism.
-
-        other   equations of the same mechanism that were derived separately, in the same coordinates: whether both are the same;
-                see symdyn.exact.across
-        Returns the claims, each with its Proof. Raises ArgumentError for equations in other coordinates, speeds or constraints.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.prove().proved
-        True
-        """
-        if other is not None:
-            from symdyn.exact.across import prove_equal
-
-            return prove_equal(self, other)
-        from symdyn.exact.mechanism import prove_equations
-
-        return prove_equations(self)
-
-    def to_casadi(self, name: str = "rhs", specialize: Numbers | None = None) -> casadi.Function:
-        """A function of the equations, such as "rhs", as a casadi.Function f(t, x, params, inputs), with exact derivatives.
-
-        name         of a function of a module; those of accelerations, such as "inverse_dynamics", take ud as well
-        specialize   parameters, by symbol or name, that become numbers
-
-        x, params and inputs are columns in the order of a module's (`module.default_parameters` has the defaults so; that of
-        system.defaults may be another); the result is NaN where a module raises. Raises MissingExtra without CasADi, SymdynError
-        for a function that the equations do not have.
-
-        >>> f = sd.systems.pendulum().embedding().to_casadi("rhs")
-        >>> f
-        Function(rhs:(t,x[2],params[3],inputs[0])->(rhs[2]) SXFunction)
-        """
-        from symdyn.targets.functions import casadi_function
-
-        return casadi_function(self, name, specialize)
-
-    def to_jax(self, name: str = "rhs", dtype: str = "float64", through: str = "xla", unroll: bool | None = None,
-               specialize: Numbers | None = None) -> Callable[..., jax.Array]:
-        """A function of the equations as f(t, x, params=None, inputs=None, ud=()) for JAX: jit, vmap, grad, jacobian.
-
-        dtype      "float64" (needs JAX's jax_enable_x64) or "float32"
-        through    "xla": statements that XLA compiles; "c": the compiled C library, which XLA calls on a CPU
-        unroll     of "xla": True: XLA gets the statements one by one; False: as a table that a loop goes through; None: as is
-                   faster on the device
-        specialize   parameters, by symbol or name, that become numbers
-
-        One state x (n_x,), params and inputs in order or by name; jax.vmap takes many. Derivatives are symdyn's own. The result
-        is NaN where a module raises. Raises MissingExtra without JAX, SymdynError for a function that the equations do not have,
-        ArgumentError for float64 while JAX computes in float32.
-
-        >>> import jax                                                         # doctest: +SKIP
-        >>> jax.config.update("jax_enable_x64", True)                          # doctest: +SKIP
-        >>> f = sd.systems.pendulum().embedding().to_jax("rhs")                # doctest: +SKIP
-        >>> f(0.0, [0.1, 0.0]).shape                                           # doctest: +SKIP
-        (2,)
-        """
-        from symdyn.targets.jax_function import jax_function
-
-        return jax_function(self, name, dtype, through, unroll, specialize)
-
-    def to_cmake(self, folder: PathName, jacobian: bool = False, specialize: Numbers | None = None) -> list[Path]:
-        """Write a CMake package for firmware and C++ into a folder; returns the paths of its files.
-
-        jacobian     whether it has the exact derivatives of the right-hand side, jacobian_x and jacobian_inputs
-        specialize   parameters, by symbol or name, that become numbers
-
-        The package has C99 sources, a header for C++17 with spans of fixed sizes, a self-test, and a README.md with the stack
-        that functions take. Numbers are double or, by the option NAME_REAL of CMake, float; nothing is allocated, nothing is
-        global; steps have a fixed length and always the same work.
-        Raises ArgumentError for events and rigid contacts, which such steps do not look for.
-
-        >>> import tempfile
-        >>> paths = sd.systems.pendulum().embedding().to_cmake(tempfile.mkdtemp())
-        >>> sorted(path.name for path in paths)[:3]
-        ['CMakeLists.txt', 'README.md', 'clock.h']
-        """
-        from symdyn.targets.cmake import write_cmake
-
-        return write_cmake(self, folder, jacobian, specialize)
-
-    def to_torch(self, name: str = "rhs", dtype: str = "float64",
-                 specialize: Numbers | None = None) -> Callable[..., torch.Tensor]:
-        """A function of the equations as f(t, x, params=None, inputs=None, ud=None) for PyTorch, with exact derivatives.
-
-        dtype        "float64" or "float32"
-        specialize   parameters, by symbol or name, that become numbers
-
-        One state x (n_x,) or many (..., n_x); arguments broadcast, params also by name. The result is NaN where a module raises.
-        Raises MissingExtra without PyTorch, SymdynError for a function that the equations do not have.
-
-        >>> import torch                                                       # doctest: +SKIP
-        >>> f = sd.systems.pendulum().embedding().to_torch("rhs")              # doctest: +SKIP
-        >>> f(0.0, torch.zeros(100, 2)).shape                                  # doctest: +SKIP
-        torch.Size([100, 2])
-        """
-        from symdyn.targets.functions import torch_function
-
-        return torch_function(self, name, dtype, specialize)
-
-    def to_sympy(self, simplify: bool = True) -> SympyEquations:
-        """The equations in SymPy's terms: functions of time, mass matrix and forcing under the names that KanesMethod has.
-
-        simplify   False: matrices as they were derived, in any time that this takes
-        Coordinates, speeds and inputs become functions of time, motions with derivatives, speeds q.dot derivatives of the
-        coordinates. Constraints come with multipliers. sd.from_sympy((s.q, s.u, s.mass_matrix, s.forcing)) is the way back of
-        equations without constraints. Raises SymdynError for what is too large to be written out, or has no explicit form.
-
-        >>> equations = sd.systems.pendulum().embedding().to_sympy()
-        >>> equations.mass_matrix, equations.forcing
-        (Matrix([[l**2*m]]), Matrix([[-g*l*m*sin(q1(t))]]))
-        """
-        from symdyn.sympy_mechanics.back import to_sympy
-
-        return to_sympy(self, simplify)
-
-    def check_units(self) -> UnitReport:
-        """Dimensional analysis of all entries by the units of the symbols (system.units): true where they agree, prints what does
-        not, such as a sum of metres and radians. See symdyn.analytic.units.
-
-        >>> equations = sd.systems.pendulum().embedding()
-        >>> equations.check_units().faults
-        ()
-        """
-        from symdyn.analytic.units import check_units
-
-        return check_units(self)
 
     def __repr__(self) -> str:
         s = self.symbols

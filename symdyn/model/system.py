@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,7 +10,8 @@ import numpy as np
 import sympy as sp
 
 from symdyn.counting import counted
-from symdyn.errors import MissingExtra, ModelError
+from symdyn.errors import ModelError
+from symdyn.facade import SystemFacade
 from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
@@ -27,7 +25,7 @@ from symdyn.model.faults import Faults
 from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
-from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.model.orientation import EulerAngles
 from symdyn.model.points import Point
 from symdyn.model.record import Model, NamedOutput
 from symdyn.model.shapes import Drawn, drawn
@@ -38,13 +36,8 @@ from symdyn.real_numbers import length_of
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
-    from symdyn.diagnosis import Diagnosis
     from symdyn.flexible.beam import Beam
     from symdyn.flexible.modal_body import ModalBody
-    from symdyn.formulation.printed.augmented import AugmentedEquations
-    from symdyn.formulation.printed.independent_speeds import MotionEquations
-    from symdyn.formulation.trees.embedding import EmbeddedEquations
-    from symdyn.formulation.trees.recursive import RecursiveEquations
     from symdyn.given import (
         BodyOrName,
         Frame,
@@ -53,14 +46,10 @@ if TYPE_CHECKING:
         MechanicsPoint,
         Named,
         Numbers,
-        Rolling,
         Scalar,
-        Values,
         Vector,
     )
     from symdyn.model.shapes import Shape
-    from symdyn.runtime.module import Module
-    from symdyn.viewer import View
 
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
@@ -68,7 +57,7 @@ Load = TypeVar("Load", Element, AddedMass)
 ContactLike = TypeVar("ContactLike", bound=Contact | JointElement | ContactGroup)
 
 
-class System:
+class System(SystemFacade):
     """A mechanism: bodies joined in a tree that starts at the ground, with loads, inputs and outputs.
 
     name         used for generated files
@@ -551,190 +540,6 @@ class System:
         """
         return check(self)
 
-    def embedding(self, frames: str = "body") -> EmbeddedEquations:
-        """The embedded equations M_tilde u_dot + k_tilde = F_tilde: mass matrix by composite bodies, factorized.
-
-        frames   the axes that quantities are formed in: "body", each link's own, or "parallel", those of the link before
-                 where axes stay parallel
-        Raises ModelError with every fault found.
-
-        >>> sd.systems.pendulum().embedding().k_tilde
-        Matrix([[0]])
-        """
-        from symdyn.formulation.trees.embedding import embed
-
-        return embed(self.check(), frames)
-
-    def recursive(self, frames: str = "body") -> RecursiveEquations:
-        """The recursive equations: inverse dynamics by Newton-Euler, accelerations by articulated bodies, both O(n).
-
-        frames   as for `embedding`
-        Raises ModelError with every fault found.
-
-        >>> sd.systems.pendulum().recursive().link("bob").I
-        Matrix([
-        [l**2*m, 0,      0,   0, 0, -l*m],
-        [     0, 0,      0,   0, 0,    0],
-        [     0, 0, l**2*m, l*m, 0,    0],
-        [     0, 0,    l*m,   m, 0,    0],
-        [     0, 0,      0,   0, m,    0],
-        [  -l*m, 0,      0,   0, 0,    m]])
-        """
-        from symdyn.formulation.trees.recursive import recursive
-
-        return recursive(self.check(), frames)
-
-    def augmented(self, coordinates: str = "relative", orientation: EulerAngles | EulerParameters | None = None,
-                  frames: str = "parallel") -> AugmentedEquations:
-        """The augmented equations M u_dot + C_r^T lam = F - k, C_r u_dot = F_d with multipliers lam.
-
-        coordinates   "relative": the tree as it is, constraints close its loops; "absolute": every body has coordinates of
-                      its own (planar x, y, theta; spatial x, y, z of its origin and its orientation in the n-frame), and every
-                      joint becomes constraints; joints that are driven, geared or used in expressions keep their coordinates
-                      besides
-        orientation   of the bodies in absolute coordinates: EulerParameters(), the default, or EulerAngles(...)
-        frames        as for `embedding`; parallel ones, where there are any, print F_d in absolute angles
-        Raises ModelError with every fault found, and for constraints that cannot hold or move nothing; SymdynError for an
-        orientation that nothing takes: in relative coordinates or in a plane.
-
-        >>> sd.systems.pendulum().augmented(coordinates="absolute").constraints
-        ('pivot_x', 'pivot_y')
-        """
-        from symdyn.formulation.constraints.augmented import augment
-
-        return augment(self.check(), coordinates, orientation, frames)
-
-    def diagnose(self, q: Values | None = None, params: Values | None = None, t: float = 0.0, coordinates: str = "relative",
-                 reach: float = math.pi) -> Diagnosis:
-        """Examine the constraints: freedoms, redundant and contradictory constraints, singular configurations, idle motions.
-
-        q             coordinates of the state to look at, in order, or by symbol or name; what is left out takes its initial
-                      value; the nearest consistent state is taken
-        params        numbers for parameters; others take their default, those without one a random number, which is reported
-        t             time, s; coordinates: as for `augmented`
-        reach         how far from the state singular configurations are looked for, along up to six independent motions both
-                      ways: change of the fastest speed's coordinate, rad or parts of the mechanism's length
-        Returns a Diagnosis, which prints as text. Raises ModelError for a description with faults; contradictory constraints
-        are listed in the diagnosis.
-
-        >>> print(sd.systems.pendulum().diagnose())
-        pendulum: diagnosis of the constraints
-          no loops or constraints: 1 degree of freedom
-        """
-        from symdyn.diagnosis import diagnose
-
-        return diagnose(self, q, params, t, coordinates, reach)
-
-    def equations(self, tune: bool = False) -> MotionEquations:
-        """The equations in the formulation that computes accelerations in the least predicted time; of a system with loops or
-        constraints the augmented ones in relative coordinates.
-
-        tune   compile the candidates and time them, instead of predicting from their operations
-        The result's `candidates` lists what it was chosen from. Raises ModelError with every fault found.
-
-        >>> sd.systems.pendulum().equations().formulation
-        'embedding'
-        """
-        from symdyn.choice import choose
-
-        return choose(self.check(), tune)
-
-    def compile(self, backend: str | None = None, tune: bool = False, templates: str | os.PathLike[str] | None = None,
-                specialize: Numbers | None = None, rolled: Rolling = "auto") -> Module:
-        """A numeric module of `equations(tune)`.
-
-        backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
-        templates    folder whose templates take precedence
-        specialize   parameters, by symbol or name, that become numbers in the code and are folded
-        rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False
-
-        Raises what `equations` raises, CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects
-        the code, SymdynError for loops with the backend "numpy", which has none.
-
-        >>> sd.systems.pendulum().compile(backend="numpy").rhs(0.0, [0.1, 0.0]).round(6)
-        array([ 0.      , -0.979366])
-        """
-        return self.equations(tune).compile(backend, templates, specialize, rolled)
-
-    def show(self, path: str | Path | None = None, params: Numbers | None = None, q: Values | None = None) -> View:
-        """The mechanism to look at before anything is simulated: a page that turns and zooms, with a slider for every coordinate,
-        and for every parameter that moves something. Its kinematics run in the page; loops are closed there by Newton's method.
-
-        path     where to write it, one HTML file that needs no network; in a notebook the result shows itself
-        params   numbers for parameters, by symbol or name; others take their default, those without one 1, which the page notes
-        q        coordinates to begin with, in order, or by symbol or name; others take their initial value
-        Raises ArgumentError for points that are not finite there, for kinematics that cannot run in a page, and for another
-        ending than .html; ModelError for a description with faults; MissingExtra without matplotlib.
-
-        >>> import tempfile
-        >>> sd.systems.two_link_arm().show(f"{tempfile.mkdtemp()}/arm.html").name
-        'two_link_arm'
-        """
-        from symdyn.viewer import show
-
-        return show(self, path, params, q)
-
-    def to_urdf(self, path: str | Path) -> Path:
-        """Write a tree of fixed, revolute and prismatic joints as a URDF file, with the parameters' default numbers.
-
-        Numbers read back to the last bit (angles of a frame: to rounding), with the same names; what `sd.read_urdf` made is read
-        back equal. Links have their frames at their joints, as the format has it; the root link is the one body that a Fixed
-        joint holds at the ground's frame, else a link "world". Joints without limits are written as continuous, dependent
-        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity (a ModelWarning says where it is not what
-        `sd.read_urdf` takes), drives by inputs, outputs and shapes have no place in it. Returns the path.
-
-        Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a
-        file that cannot be written; ArgumentError for a path that is none.
-
-        >>> import tempfile
-        >>> folder = tempfile.mkdtemp()
-        >>> system = sd.System("slider", gravity=[0, 0, -9.81])
-        >>> joint = system.add_joint(sd.Prismatic("rail", system.ground, system.add_body("block", mass=1), axis=[1, 0, 0]))
-        >>> system.to_urdf(f"{folder}/chain.urdf").name
-        'chain.urdf'
-        """
-        from symdyn.urdf.write import write_urdf
-
-        return write_urdf(self.check(), path)
-
-    def to_mjcf(self, path: str | Path) -> Path:
-        """Write the mechanism as a model of MuJoCo's (MJCF), with the parameters' default numbers.
-
-        Fixed, revolute, prismatic, universal, planar, cylindrical, spherical and free joints are written; those with Euler angles
-        as one slide or hinge a coordinate. Loops by fixed, revolute and spherical joints, gears, constraints y = polynomial of x
-        and dependent coordinates become equality constraints, which are soft in MuJoCo. Forces along joints that are linear in
-        their coordinate, speed and inputs, springs and dampers between points, and forces between points become stiffness,
-        damping,
-        tendons and motors. Bodies without mass between joints vanish; a body on the ground that another joint's coordinate moves
-        is its armature. Initial values become the keyframe "initial"; outputs and shapes have no part in it. Coordinates have the
-        same order and meaning; the speeds, too, but those of Free joints with velocity="body". Returns the path.
-
-        Raises ModelError with all faults: of the description, what MJCF has no words for, moving bodies that MuJoCo rejects,
-        parameters without a number, and a file that cannot be written; ArgumentError for a path that is none.
-
-        >>> import tempfile
-        >>> sd.systems.spatial_chain(3).to_mjcf(f"{tempfile.mkdtemp()}/chain.xml").name
-        'chain.xml'
-        """
-        from symdyn.mjcf.write import write_mjcf
-
-        return write_mjcf(self.check(), path)
-
-    def to_toml(self, path: str | Path | None = None) -> str:
-        """The description as a data file in TOML, which `sd.read_system` makes an equal system of: the same generated code.
-
-        path   where to write it, a file that ends in .toml; default: nowhere
-        Returns the text. Every element is written, with symbols, numbers and units; expressions as texts that a strict parser
-        reads back. Raises ModelError with all faults: of the description, functions of the user (sd.External), which are
-        programs, and whatever else a data file has no words for; ArgumentError for another ending.
-
-        >>> print(sd.systems.pendulum().to_toml().splitlines()[2])
-        name = "pendulum"
-        """
-        from symdyn.datafile.write import write_system
-
-        return write_system(self, path)
-
     def _of_sympy(self, demanded: Callable[[Any, str], Any], given: Any, what: str) -> Any:
         """What was given as `demanded` takes it, a ReferenceFrame or a Point, or None."""
         try:
@@ -773,14 +578,6 @@ class System:
         parts += [counted(len(things), one) for things, one in ((self.loops, "loop closure"), (self.constraints, "constraint"))
                   if things]
         return f"System({shown(self.name)}, {', '.join(parts)})"
-
-    def _repr_html_(self) -> str | None:
-        """A small picture and tables, in a notebook; the text of `repr` without matplotlib."""
-        try:
-            from symdyn.viewer.summary import summary_of
-        except MissingExtra:
-            return None
-        return summary_of(self)
 
     def set_defaults(self, defaults: Numbers) -> System:
         """Add numbers for parameters; returns the system.

@@ -6,18 +6,15 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from symdyn.facade import MotionFacade
 from symdyn.formulation.equations import Equations
 
 if TYPE_CHECKING:
 
-    from symdyn.analytic.conserved import ConservedQuantities
-    from symdyn.analytic.equilibria import EquilibriumPoints
-    from symdyn.analytic.linear import Linearized
-    from symdyn.formulation.printed.provenance import Explanation
-    from symdyn.given import Named, Names, Scalar
+    pass
 
 
-class MotionEquations(Equations):
+class MotionEquations(MotionFacade, Equations):
     """M_tilde u_dot + k_tilde = F_tilde; every property is explicit SymPy, simplified as far as its time limit allows.
 
     >>> equations = sd.systems.pendulum().embedding()
@@ -170,17 +167,6 @@ class MotionEquations(Equations):
         return self.explicit("momenta")
 
     @property
-    def momentum_symbols(self) -> sp.Matrix:
-        """(n_q, 1) symbols of the momenta, p_q1 of q1, in `hamiltonian` and `hamilton_equations`.
-
-        >>> sd.systems.pendulum().embedding().momentum_symbols
-        Matrix([[p_q1]])
-        """
-        from symdyn.analytic.lagrange import momentum_leaves
-
-        return sp.Matrix(list(momentum_leaves(self).values()))
-
-    @property
     def hamiltonian(self) -> sp.Expr:
         """Hamilton's function p . q_dot - L in coordinates, momenta and t, J. Raises SymdynError for quasi-velocities, and
         where the mass matrix couples more than three speeds.
@@ -189,20 +175,6 @@ class MotionEquations(Equations):
         -g*l*m*cos(q1) + p_q1**2/(2*l**2*m)
         """
         return self.explicit("hamiltonian")
-
-    @property
-    def hamilton_equations(self) -> tuple[sp.Eq, ...]:
-        """q_dot = dH/dp, then p_dot = -dH/dq + loads without potential; under constraints less C_r^T lam, and the constraints.
-
-        Where the mass matrix couples more than two speeds, p_dot is in q and q_dot; where more than three, p = dT/dq_dot stands
-        in place of q_dot = dH/dp. Raises SymdynError for quasi-velocities.
-
-        >>> sd.systems.pendulum().embedding().hamilton_equations
-        (Eq(q1_dot, p_q1/(l**2*m)), Eq(p_q1_dot, -g*l*m*sin(q1)))
-        """
-        from symdyn.analytic.hamilton import equations_of
-
-        return equations_of(self)
 
     @property
     def christoffel(self) -> sp.ImmutableDenseNDimArray:
@@ -217,73 +189,3 @@ class MotionEquations(Equations):
         n = len(self.symbols.speeds)
         return sp.ImmutableDenseNDimArray(list(self.explicit("christoffel")), (n, n, n))
 
-    def conserved(self, undriven: bool = False) -> ConservedQuantities:
-        """Momenta and energy, or Jacobi's integral, that every motion keeps, each with its proof.
-
-        undriven   True: with all inputs zero; motions that are functions of the time go on
-        See symdyn.analytic.conserved. Raises SymdynError where loads depend on accelerations or reactions.
-
-        >>> sd.systems.pendulum().embedding().conserved()
-        pendulum: conserved along every motion
-          energy = l*m*(-g*cos(q1) + l*q1_dot**2/2)   (T + V; proved)
-        """
-        from symdyn.analytic.conserved import conserved
-
-        return conserved(self, undriven)
-
-    def linearized(self, about: Named[Scalar] | None = None, hold: Names = (), coordinates: Names = ()) -> Linearized:
-        """M, C, K, A, B about a state of rest or a steady motion, explicit in the parameters, with its conditions.
-
-        about   coordinates, speeds, states, inputs by symbol or name -> numbers or expressions in parameters; left out: zero
-        hold    coordinates or speeds that are held
-        coordinates   those that are to be independent under constraints; default: the first ones that are
-        See symdyn.analytic.linear. Raises ArgumentError, and SymdynError for what has no constant linear equations.
-
-        >>> sd.systems.pendulum().embedding().linearized()
-        pendulum: linear equations in q1
-          M = [[l**2*m]]
-          C = [[0]]
-          K = [[g*l*m]]
-        """
-        from symdyn.analytic.linear import linearized
-
-        return linearized(self, about, hold, coordinates)
-
-    def equilibria(self, fixed: Named[Scalar] | None = None, values: Named[Scalar] | None = None,
-                   seconds: float | None = None) -> EquilibriumPoints:
-        """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
-
-        fixed    coordinates that are held, inputs, speeds of a steady motion -> numbers or expressions in parameters
-        values   numbers for parameters
-        seconds  that the search may take; default: simplify_seconds, which is 10
-        See symdyn.analytic.equilibria. Raises SymdynError with the reason where there is no closed form, and ArgumentError for
-        seconds that are no positive number.
-
-        >>> sd.systems.pendulum().embedding().equilibria()
-        pendulum: 2 equilibria
-          q1 = 0
-          q1 = pi
-          taken not to be zero: g, l, m
-        """
-        from symdyn.analytic.equilibria import equilibria
-
-        return equilibria(self, fixed, values, seconds)
-
-    def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
-        """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
-
-        The contributions of each body, translational and rotational, and for k_tilde the centrifugal, Coriolis and gyroscopic
-        ones. See symdyn.formulation.printed.provenance.
-
-        >>> print(sd.systems.pendulum().embedding().explain("M_tilde", 0, 0))
-        M_tilde[0, 0] is the sum of
-          bob  translational  l**2*m
-        """
-        from symdyn.formulation.printed.provenance import explain
-
-        return explain(self, quantity, *index, simplify=simplify)
-
-    def _repr_latex_(self) -> str:
-        from symdyn.report.notebook import equation_page
-
-        return equation_page(self)
