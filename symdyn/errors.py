@@ -45,7 +45,7 @@ class CompilerNotFound(SymdynError):
 
 
 class CompilerWarning(UserWarning):
-    """Warns that written files have no binary, because there is no C compiler; the message says how they can be used."""
+    """Warns that written files have no binary, because there is no C compiler for it; the message says how they can be used."""
 
 
 class ModelWarning(UserWarning):

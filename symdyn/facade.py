@@ -1,7 +1,7 @@
 """Facade of a system and its equations: the methods that lead to other parts of the package, in one place.
 
-The classes describe and record; these methods name what comes of it, and import it when they are called. No other class below
-the runtime looks up the table of imports (docs/architecture.md) for a method that its users call.
+The classes describe and record; these methods name what comes of it. They import it when they are called, since it stands in
+later rows of the table of imports (docs/architecture.md).
 """
 
 from __future__ import annotations

@@ -43,6 +43,9 @@ VERSIONS = (3, 2)
 KINDS = ("model_exchange", "co_simulation")
 # Of a step of co-simulation, where the importer gives none.
 TOLERANCE = 1e-9
+# An FMU allocates memory and compares texts; the package of tcc brings neither the headers of libc nor the paths to them.
+NO_HEADERS = ("the C compiler found is tcc, which does not find the headers of the C library; install gcc or clang, or set "
+              "SYMDYN_CC to one of them")
 _LIBRARY = ".dll" if sys.platform == "win32" else ".dylib" if sys.platform == "darwin" else ".so"
 _MACHINES = {"amd64": "x86_64", "x64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
 _SYSTEMS = {"win32": "windows", "darwin": "darwin"}
@@ -75,9 +78,10 @@ def write_fmu(module: Module, path: Any, version: int, kind: str, *, q: Any = No
     source, derivatives = source_of(equations, specialize)
     files = _files(module, source, version, kind, start, derivatives)
     compiler = find_compiler()
-    if compiler is None:
-        warnings.warn(f"{module.name}: {target} has sources and no binary: {no_compiler_reason()}. Importers that compile "
-                      "sources take it as it is", CompilerWarning, stacklevel=3)
+    missing = no_compiler_reason() if compiler is None else NO_HEADERS if compiler.kind == "tcc" else ""
+    if compiler is None or missing:
+        warnings.warn(f"{module.name}: {target} has sources and no binary: {missing}. Importers that compile sources take it "
+                      "as it is", CompilerWarning, stacklevel=3)
     else:
         files |= _binary(module.name, source.metadata.name, files, version, compiler)
     with writing(target):

