@@ -10,7 +10,7 @@ import shutil
 import signal
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +171,15 @@ def compiled(derived: Callable[..., Any]) -> Callable[..., Any]:
         return known[key]
 
     return module
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """The browser of all tests of a process: one takes a second to start and to end."""
+    from tests.helpers import browser
+
+    with browser() as opened:
+        yield opened
 
 
 @pytest.fixture

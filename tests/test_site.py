@@ -8,7 +8,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from html import escape, unescape
 from pathlib import Path
 from typing import Any, Literal
@@ -19,7 +19,7 @@ import pytest
 import symdyn as sd
 from tests.checks import public_names, walk
 from tests.checks.every_page import Watched
-from tests.helpers import CONTRAST, browser
+from tests.helpers import CONTRAST
 from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
@@ -48,12 +48,6 @@ def build(folder: Path, mechanisms: Sequence[str]) -> Path:
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build(tmp_path_factory.mktemp("site"), SOME)
-
-
-@pytest.fixture(scope="module")
-def shown() -> Iterator[Any]:
-    with browser() as opened:
-        yield opened
 
 
 def test_every_public_name_has_an_entry(site: Path) -> None:
@@ -92,15 +86,15 @@ def test_docstrings_are_typeset(site: Path) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_pages_work_without_a_network(site: Path, shown: Any, name: str) -> None:
+def test_pages_work_without_a_network(site: Path, chromium: Any, name: str) -> None:
     """No request beyond the disk, nothing on the console, nothing wider than its box or the window; tests/checks/every_page.py
     opens all of them."""
-    watched = Watched(shown)
+    watched = Watched(chromium)
     assert [*watched.open(site / f"{name}.html"), *watched.wider()] == []
     watched.page.close()
 
 
-def test_faults_of_pages_are_found(shown: Any, tmp_path: Path) -> None:
+def test_faults_of_pages_are_found(chromium: Any, tmp_path: Path) -> None:
     """Each of the checks of pages finds its fault."""
     page = tmp_path / "page.html"
     page.write_text("""<!doctype html><style>a { display: block; outline: none !important; }</style>
@@ -110,7 +104,7 @@ def test_faults_of_pages_are_found(shown: Any, tmp_path: Path) -> None:
         <div style="overflow: auto; width: 200px"><pre style="width: 900px">scrolls</pre></div>
         <div style="width: 1300px; height: 9px; position: absolute"></div><a href="#">plain</a>
         <button onfocus="this.blur()" id="shy">shy</button></div><script>console.log("talk")</script>""", encoding="utf-8")
-    watched = Watched(shown)
+    watched = Watched(chromium)
     opened = list(watched.open(page))
     assert opened[0] == "requested: http://127.0.0.1:8099/x.png" and "on the console: talk" in opened
     wider = list(watched.wider())
@@ -124,9 +118,9 @@ def test_faults_of_pages_are_found(shown: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", [*PAGES, "search", "messages", "theory/embedding", "reference/errors"])
-def test_text_can_be_read(site: Path, shown: Any, name: str, scheme: Literal["light", "dark"]) -> None:
+def test_text_can_be_read(site: Path, chromium: Any, name: str, scheme: Literal["light", "dark"]) -> None:
     """Contrast AA of all text: contents, code, tables, formulas; a reader's choice of dark or light counts as well."""
-    page = shown.new_page(color_scheme=scheme)
+    page = chromium.new_page(color_scheme=scheme)
     page.goto((site / f"{name}.html").as_uri())
     assert page.evaluate(CONTRAST) == []
     chosen = {"light": "dark", "dark": "light"}[scheme]
@@ -137,9 +131,9 @@ def test_text_can_be_read(site: Path, shown: Any, name: str, scheme: Literal["li
     page.close()
 
 
-def test_text_that_cannot_be_read_is_found(shown: Any) -> None:
+def test_text_that_cannot_be_read_is_found(chromium: Any) -> None:
     """Grey text is a fault and large grey text is none; what lets its background through counts as it is seen."""
-    page = shown.new_page(color_scheme="light")
+    page = chromium.new_page(color_scheme="light")
     page.set_content("<p style='color: #808080'>small</p><p style='color: #808080; font-size: 30px'>large</p>"
                      "<p style='color: rgba(0, 0, 0, 0.4)'>faint</p><p>black</p>")
     assert [fault.split()[1] for fault in page.evaluate(CONTRAST)] == ["small", "faint"]
@@ -147,20 +141,20 @@ def test_text_that_cannot_be_read_is_found(shown: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["index", "gallery", "gallery/puma560", "reference/module", "tutorials/robot_arm_from_urdf"])
-def test_the_keyboard_reaches_everything(site: Path, shown: Any, name: str) -> None:
+def test_the_keyboard_reaches_everything(site: Path, chromium: Any, name: str) -> None:
     """Tab goes to every link, button and field of a page that is seen, in a cycle, and each has an outline then."""
-    watched = Watched(shown)
+    watched = Watched(chromium)
     watched.page.goto((site / f"{name}.html").as_uri())
     assert list(watched.unreached()) == [] and watched.page.evaluate("reached.size") > 20
     watched.page.close()
 
 
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.sweep)])
-def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, shown: Any, request: pytest.FixtureRequest) -> None:
+def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, chromium: Any, request: pytest.FixtureRequest) -> None:
     """A picture of each in the grid, and a page with its equations and numbers."""
     site = build(tmp_path, ()) if every else request.getfixturevalue("site")
     names = [name for name in sd.systems.names() if every or name in SOME]
-    page = shown.new_page()
+    page = chromium.new_page()
     page.goto((site / "gallery.html").as_uri())
     for image in page.query_selector_all(".gallery img"):
         image.scroll_into_view_if_needed()
@@ -179,10 +173,10 @@ def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, shown: Any, r
 
 
 @pytest.mark.parametrize("name", ["four_bar", "puma560"])
-def test_mechanisms_of_the_gallery_move(site: Path, shown: Any, name: str) -> None:
+def test_mechanisms_of_the_gallery_move(site: Path, chromium: Any, name: str) -> None:
     """The embedded page plays without a click, unless the reader asked for reduced motion."""
     for motion, moves in (("no-preference", True), ("reduce", False)):
-        page = shown.new_page(reduced_motion=motion)
+        page = chromium.new_page(reduced_motion=motion)
         page.goto((site / "gallery" / f"{name}.html").as_uri())
         page.query_selector("iframe.view").scroll_into_view_if_needed()
         view = page.query_selector("iframe.view").content_frame()
@@ -207,9 +201,9 @@ def test_lines_of_formulas_are_aligned(site: Path) -> None:
     assert four_bar.count('<mtd columnalign="left">') > 4
 
 
-def test_functions_are_set_off_from_their_factors(site: Path, shown: Any) -> None:
+def test_functions_are_set_off_from_their_factors(site: Path, chromium: Any) -> None:
     """R cos γt: a thin space at both sides of the name, none before a parenthesis."""
-    page = shown.new_page()
+    page = chromium.new_page()
     page.goto((site / "tutorials" / "chapter_1_particles.html").as_uri())
     gaps = page.evaluate("""() => [...document.querySelectorAll("math mo")].filter(e => /^(sin|cos)$/.test(e.textContent)
         && e.previousElementSibling?.tagName === "mi" && e.nextElementSibling).map(e => {
@@ -248,9 +242,9 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
 
 @pytest.mark.parametrize(("name", "views"), [("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),
                                              ("wheel_on_a_road", 1)])
-def test_views_of_tutorials_are_drawn(site: Path, shown: Any, name: str, views: int) -> None:
+def test_views_of_tutorials_are_drawn(site: Path, chromium: Any, name: str, views: int) -> None:
     """What a notebook showed as a page that turns is drawn on the tutorial's page, without a word on the console."""
-    page = shown.new_page()
+    page = chromium.new_page()
     said: list[str] = []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
@@ -344,8 +338,8 @@ def test_links_within_the_site_lead_somewhere(site: Path) -> None:
         assert not anchor or file not in ids or unquote(anchor) in ids[file], (page.name, link)
 
 
-def test_the_search_finds_a_name(site: Path, shown: Any) -> None:
-    page = shown.new_page()
+def test_the_search_finds_a_name(site: Path, chromium: Any) -> None:
+    page = chromium.new_page()
     page.goto((site / "search.html").as_uri() + "?q=close_loop")
     page.wait_for_selector("#search-results li", timeout=20_000)
     assert "Constraints" in page.inner_text("#search-results") or "close_loop" in page.inner_text("#search-results")

@@ -13,7 +13,6 @@ from symdyn.comparison.typeset import Lines, formula_latex, mathml, width
 from symdyn.comparison.verdict import Verdict
 from symdyn.model.symbols import symbols_of
 from symdyn.report.latex import letters
-from tests.helpers import browser
 
 q = sd.coordinates("q1")
 m, l, g = sd.parameters("m l g", positive=True)
@@ -182,9 +181,10 @@ def test_the_document_compiles_with_formulas_of_a_readable_size(comparisons, bar
 
 
 @pytest.fixture(scope="module")
-def page():
-    with browser() as opened:
-        yield opened.new_page(viewport={"width": 1300, "height": 900})
+def page(chromium):
+    opened = chromium.new_page(viewport={"width": 1300, "height": 900})
+    yield opened
+    opened.close()
 
 
 @pytest.mark.parametrize("name", ["comparison.html", "errata.html"])

@@ -31,7 +31,6 @@ from symdyn.stress.record import Row as StressRow
 from symdyn.stress.record import StressReport
 from symdyn.stress.run import stress
 from symdyn.stress.system_under_test import SystemUnderTest
-from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
@@ -376,17 +375,17 @@ def test_wrong_commands(arguments: list[str], message: str, tmp_path: Path, monk
     assert message in said and "Traceback" not in said
 
 
-def test_the_page_opens_in_a_browser_without_network_or_errors(written: tuple[Path, list[str]]) -> None:
-    with browser() as opened:
-        page = opened.new_page(viewport={"width": 1300, "height": 900})
-        requests: list[str] = []
-        complaints: list[str] = []
-        page.on("request", lambda r: requests.append(r.url))
-        page.on("console", lambda m: complaints.append(m.text))
-        page.goto(written[0].as_uri())
-        for width in (1300, 420):
-            page.set_viewport_size({"width": width, "height": 900})
-            assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
-        assert [r for r in requests if not r.startswith(("file:", "data:"))] == [] and complaints == []
-        sizes = page.evaluate("[...document.images].map(i => [i.naturalWidth, i.naturalHeight, i.alt.length])")
-        assert len(sizes) == 4 and all(w > 50 and h > 30 and alt > 0 for w, h, alt in sizes)
+def test_the_page_opens_in_a_browser_without_network_or_errors(written: tuple[Path, list[str]], chromium: Any) -> None:
+    page = chromium.new_page(viewport={"width": 1300, "height": 900})
+    requests: list[str] = []
+    complaints: list[str] = []
+    page.on("request", lambda r: requests.append(r.url))
+    page.on("console", lambda m: complaints.append(m.text))
+    page.goto(written[0].as_uri())
+    for width in (1300, 420):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    assert [r for r in requests if not r.startswith(("file:", "data:"))] == [] and complaints == []
+    sizes = page.evaluate("[...document.images].map(i => [i.naturalWidth, i.naturalHeight, i.alt.length])")
+    assert len(sizes) == 4 and all(w > 50 and h > 30 and alt > 0 for w, h, alt in sizes)
+    page.close()

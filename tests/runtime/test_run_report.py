@@ -21,7 +21,6 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.solutions import report as run_report
 from symdyn.runtime.solutions import tables as run_tables
 from symdyn.runtime.solutions.solution import Solution
-from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
@@ -238,19 +237,22 @@ def test_the_command_line_writes_a_report(tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.fixture
-def open_page() -> Iterator[Callable[[Path, int], Any]]:
-    with browser() as opened:
+def open_page(chromium: Any) -> Iterator[Callable[[Path, int], Any]]:
+    opened = []
 
-        def show(path: Path, width: int) -> Any:
-            page = opened.new_page(viewport={"width": width, "height": 900})
-            page.requests, page.complaints = [], []
-            page.on("request", lambda r: page.requests.append(r.url))
-            page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
-            page.goto(path.as_uri())
-            page.wait_for_load_state("networkidle")
-            return page
+    def show(path: Path, width: int) -> Any:
+        page = chromium.new_page(viewport={"width": width, "height": 900})
+        opened.append(page)
+        page.requests, page.complaints = [], []
+        page.on("request", lambda r: page.requests.append(r.url))
+        page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
+        page.goto(path.as_uri())
+        page.wait_for_load_state("networkidle")
+        return page
 
-        yield show
+    yield show
+    for page in opened:
+        page.close()
 
 
 def test_the_report_opens_in_a_browser_without_network_or_errors(open_page: Callable[[Path, int], Any], report: Path) -> None:

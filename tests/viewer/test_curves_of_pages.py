@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.runtime.solutions.solution import Solution
-from tests.helpers import CONTRAST, browser
+from tests.helpers import CONTRAST, values_of
 
 pytest.importorskip("matplotlib")
 
@@ -25,12 +24,6 @@ G, MU, DROP = 9.81, 0.4, 0.1
 LANDS = float(np.sqrt(2 * DROP / G))
 RESTS = LANDS + (1 - MU * G * LANDS) / (MU * G)
 STORED = sorted((Path(__file__).parents[2] / "notebooks" / "results").glob("*_view_*.json"))
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +55,9 @@ def data_of(html: str) -> dict[str, Any]:
 
 def pixels(page: Any, which: int = 0) -> np.ndarray:
     """Of the canvas of a plot, (rows, columns, 4)."""
-    found = page.evaluate("""which => { const c = document.querySelectorAll(".plot canvas")[which];
-        return [c.height, c.width, Array.from(c.getContext("2d").getImageData(0, 0, c.width, c.height).data)]; }""", which)
-    return np.array(found[2]).reshape(found[0], found[1], 4)
+    high, wide = page.evaluate("which => (c => [c.height, c.width])(document.querySelectorAll('.plot canvas')[which])", which)
+    return values_of(page, """which => { const c = document.querySelectorAll(".plot canvas")[which];
+        return c.getContext("2d").getImageData(0, 0, c.width, c.height).data; }""", which).reshape(high, wide, 4)
 
 
 def column(page: Any, t: float) -> float:

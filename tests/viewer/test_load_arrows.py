@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,6 @@ import pytest
 
 import symdyn as sd
 from symdyn.runtime.module import Module
-from tests.helpers import browser
 from tests.viewer.test_views import Opened
 
 pytest.importorskip("matplotlib")
@@ -41,12 +39,6 @@ def of_all_kinds(gravity: float = 0.0) -> sd.System:
     system.add_force_between(arm, system.ground, 11.0, point_a=[0.2, 0.3, 0], point_b=[3, 1, 2])
     system.add_load(sd.LinearDamping(fore, np.diag([1, 2, 3, 0.4, 0.5, 0.6]).tolist(), name="water"))
     return system
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

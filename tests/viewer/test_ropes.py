@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.mechanism import mechanism_of
 from symdyn.pictures.ropes import mooring, rope
 from symdyn.runtime.solutions.solution import Solution
-from tests.helpers import browser
 from tests.viewer.test_grounds import data_of
 from tests.viewer.test_views import Opened
 
@@ -54,14 +54,14 @@ def test_a_taut_rope_is_straight() -> None:
     np.testing.assert_allclose(np.linalg.norm(np.diff(found, axis=0), axis=1), 5 / 24)
 
 
-def test_a_rope_sags_until_it_is_taut(tmp_path: Path) -> None:
+def test_a_rope_sags_until_it_is_taut(chromium: Any, tmp_path: Path) -> None:
     solution = tethered().compile(backend="numpy").simulate((0, 2))
     (connection,) = solution.module.metadata.connections
     assert connection == ("rope 'tether'", "ball", "ground", "rope")
     solution.view(tmp_path / "view.html")
     lowest = """() => { symdyn.stage.draw(false); const own = symdyn.scenes[0].picks.filter(p => p.name === "rope 'tether'");
         return [own.length, Math.min(...own.map(p => Math.min(p.a[2], p.b[2]))), own.map(p => [...p.a, ...p.b])]; }"""
-    with browser() as opened, Opened(opened, tmp_path / "view.html") as page:
+    with Opened(chromium, tmp_path / "view.html") as page:
         pieces, low, ways = page.page.evaluate(lowest)
         assert pieces == 24 and low < -0.2
         wanted = rope(np.array([0, 0, 0.2]), np.array([0.8, 0, 0]), 1.5, UP)
@@ -71,11 +71,11 @@ def test_a_rope_sags_until_it_is_taut(tmp_path: Path) -> None:
         assert pieces == 1 and low == pytest.approx(0, abs=1e-3)
 
 
-def test_pictures_and_the_page_of_the_mechanism_show_ropes(tmp_path: Path) -> None:
+def test_pictures_and_the_page_of_the_mechanism_show_ropes(chromium: Any, tmp_path: Path) -> None:
     system = tethered()
     assert "polyline" in (system._repr_html_() or "")
     system.show(tmp_path / "show.html", params={"l": 2.5})
-    with browser() as opened, Opened(opened, tmp_path / "show.html") as page:
+    with Opened(chromium, tmp_path / "show.html") as page:
         (item,) = [item for item in page.page.evaluate("symdyn.scenes[0].data.items") if item["kind"] == "rope"]
         assert item["size"][1] == pytest.approx(2.5)
 
@@ -167,7 +167,7 @@ def test_mooring_lines_hang_in_stills_at_every_time(buoy: Solution) -> None:
         )
 
 
-def test_pages_draw_mooring_lines_as_python_does(buoy: Solution, tmp_path: Path) -> None:
+def test_pages_draw_mooring_lines_as_python_does(buoy: Solution, chromium: Any, tmp_path: Path) -> None:
     """In a motion at two of its times; and for lines of all kinds: to the tolerance of Newton's method."""
     buoy.view(tmp_path / "view.html")
     rng = np.random.default_rng(8)
@@ -175,7 +175,7 @@ def test_pages_draw_mooring_lines_as_python_does(buoy: Solution, tmp_path: Path)
         (rng.uniform(0.01, 1.2), rng.uniform(0.02, 0.9), rng.choice([0, 1e-3, 0.05]), rng.choice([0.0, 0.3, 1.0]), bool(s))
         for s in rng.integers(0, 2, 200)
     ]
-    with browser() as opened, Opened(opened, tmp_path / "view.html") as page:
+    with Opened(chromium, tmp_path / "view.html") as page:
         for k in (0, -1):
             ways = page.page.evaluate(
                 """t => { symdyn.scenes[0].source.seek(t); symdyn.stage.draw(false);

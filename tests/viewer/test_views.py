@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 import subprocess
 import sys
@@ -18,8 +17,8 @@ import symdyn as sd
 from symdyn.cli import main
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.viewer import View
-from tests.firefox import FirefoxPage, firefox
-from tests.helpers import CONTRAST, browser
+from tests.firefox import Firefox, FirefoxPage, firefox
+from tests.helpers import CONTRAST, values_of
 from tests.user_functions import HEIGHT
 
 pytest.importorskip("matplotlib")
@@ -27,16 +26,15 @@ pytest.importorskip("matplotlib")
 from symdyn.pictures.looks import METAL
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as opened:
+@pytest.fixture(scope="session")
+def of_firefox() -> Iterator[Firefox]:
+    with firefox() as opened:
         yield opened
 
 
-@pytest.fixture(scope="module", params=[browser, firefox], ids=["chromium", "firefox"])
-def every_browser(request: pytest.FixtureRequest) -> Iterator[Any]:
-    with request.param() as opened:
-        yield opened
+@pytest.fixture(params=["chromium", "of_firefox"], ids=["chromium", "firefox"])
+def every_browser(request: pytest.FixtureRequest) -> Any:
+    return request.getfixturevalue(request.param)
 
 
 class Opened:
@@ -65,12 +63,10 @@ class Opened:
 
     def pixels(self) -> np.ndarray:
         """The picture as the last frame has it, (n, 4)."""
-        found = self.page.evaluate("""() => { const s = symdyn.stage, gl = s.renderer.gl; s.draw(false);
+        return values_of(self.page, """() => { const s = symdyn.stage, gl = s.renderer.gl; s.draw(false);
             const p = new Uint8Array(4 * s.canvas.width * s.canvas.height);
             gl.readPixels(0, 0, s.canvas.width, s.canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
-            let text = ""; for (let k = 0; k < p.length; k += 4096) text += String.fromCharCode(...p.subarray(k, k + 4096));
-            return btoa(text); }""")
-        return np.frombuffer(base64.b64decode(found), np.uint8).reshape(-1, 4)
+            return p; }""").reshape(-1, 4)
 
     def slide(self, name: str, value: float) -> None:
         """Move a slider as its user does."""

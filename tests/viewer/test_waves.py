@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import symdyn as sd
 from symdyn.errors import ModelError
-from tests.helpers import browser
 from tests.viewer.test_views import Opened
 
 pytest.importorskip("matplotlib")
@@ -37,11 +37,11 @@ def floating() -> sd.System:
     return system
 
 
-def test_the_surface_moves_with_the_force_of_the_waves(tmp_path: Path) -> None:
+def test_the_surface_moves_with_the_force_of_the_waves(chromium: Any, tmp_path: Path) -> None:
     module = floating().compile(backend="numpy")
     module.simulate((0, 20)).view(tmp_path / "view.html", forces=True)
     row = module.metadata.acting.index(("waves", "box", "force"))
-    with browser() as opened, Opened(opened, tmp_path / "view.html") as page:
+    with Opened(chromium, tmp_path / "view.html") as page:
         for t in (2.5, 11.3):
             page.page.evaluate("t => symdyn.scenes[0].source.seek(t)", t)
             found = np.array(page.page.evaluate(SURFACE)).reshape(-1, 6)
@@ -62,11 +62,11 @@ def test_the_surface_moves_with_the_force_of_the_waves(tmp_path: Path) -> None:
             np.testing.assert_allclose(slope, (normal[1:] + normal[:-1]) / 2, atol=1e-4)
 
 
-def test_waves_come_with_data_files_and_the_slider_of_time(tmp_path: Path) -> None:
+def test_waves_come_with_data_files_and_the_slider_of_time(chromium: Any, tmp_path: Path) -> None:
     floating().to_toml(tmp_path / "float.toml")
     system = sd.read_system(tmp_path / "float.toml")
     system.show(tmp_path / "show.html")
-    with browser() as opened, Opened(opened, tmp_path / "show.html") as page:
+    with Opened(chromium, tmp_path / "show.html") as page:
         before = np.array(page.page.evaluate(SURFACE))
         (slider,) = [s for s in page.page.evaluate("symdyn.scenes[0].data.sliders") if s["group"] == "t"]
         page.page.evaluate("s => { symdyn.scenes[0].source.set(s, 12) }", slider)
