@@ -3,12 +3,15 @@
 python -m sphinx -W -b html docs generated/site
 """
 
+import gc
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 import symdyn
+
+gc.set_threshold(200_000, 20, 50)  # documents are many small nodes that stay; looking for garbage takes a sixth of the time
 
 project = "symdyn"
 author = copyright = "the symdyn developers"

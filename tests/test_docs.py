@@ -4,12 +4,13 @@ import ast
 import json
 import re
 import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.running import run_program
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -30,7 +31,7 @@ def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
         pytest.skip("no code on this page")
     script = tmp_path / "page.py"  # functions of the user are read from a file
     script.write_text("\n".join(code), encoding="utf-8")
-    run = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    run = run_program(script)
     assert run.returncode == 0, run.stderr
     assert "Warning" not in run.stderr
     assert run.stdout == "".join(shown)

@@ -19,13 +19,15 @@ import pytest
 import symdyn as sd
 from tests.checks import public_names, walk
 from tests.checks.every_page import Watched
-from tests.helpers import CONTRAST
+from tests.helpers import CONTRAST, swept
 from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("index", "tutorials", "tutorials/crane_with_controller", "tutorials/two_link_arm", "tutorials/wheel_on_a_road",
          "describing_mechanisms", "printing", "measured", "gallery", "gallery/puma560", "gallery/bicycle",
          "reference/system", "reference/module", "contributing", "genindex")
+# One of each kind, which the suite opens; the sweep opens all.
+KINDS = "index", "tutorials/wheel_on_a_road", "measured", "gallery", "gallery/puma560", "reference/system"
 
 
 # The site is built once by each process that needs it; tests that stand at the front of the run stay in one.
@@ -33,7 +35,7 @@ pytestmark = pytest.mark.slow
 
 
 # Of these the gallery has pages: trees, loops, a rolling contact, what floats, what touches. All others are in the sweep.
-SOME = ["bicycle", "floating_crane", "four_bar", "pendulum", "puma560", "rocking_block"]
+SOME = ["floating_crane", "four_bar", "pendulum", "puma560", "rocking_block", "rolling_disc"]
 
 
 def build(folder: Path, mechanisms: Sequence[str]) -> Path:
@@ -48,6 +50,19 @@ def build(folder: Path, mechanisms: Sequence[str]) -> Path:
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build(tmp_path_factory.mktemp("site"), SOME)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("whole"), ())
+
+
+@pytest.fixture
+def there(name: str, request: pytest.FixtureRequest) -> Path:
+    """The file of a page; of a mechanism that is not among some of them only the whole site has one."""
+    rest = name.startswith("gallery/") and name.removeprefix("gallery/") not in SOME
+    site: Path = request.getfixturevalue("whole" if rest else "site")
+    return site / f"{name}.html"
 
 
 def test_every_public_name_has_an_entry(site: Path) -> None:
@@ -85,12 +100,12 @@ def test_docstrings_are_typeset(site: Path) -> None:
     assert "in loads and outputs; <code" in symbols and 'id="symdyn.t"' in symbols
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_work_without_a_network(site: Path, chromium: Any, name: str) -> None:
+@pytest.mark.parametrize("name", swept(PAGES, *KINDS))
+def test_pages_work_without_a_network(there: Path, chromium: Any) -> None:
     """No request beyond the disk, nothing on the console, nothing wider than its box or the window; tests/checks/every_page.py
     opens all of them."""
     watched = Watched(chromium)
-    assert [*watched.open(site / f"{name}.html"), *watched.wider()] == []
+    assert [*watched.open(there), *watched.wider()] == []
     watched.page.close()
 
 
@@ -116,12 +131,14 @@ def test_faults_of_pages_are_found(chromium: Any, tmp_path: Path) -> None:
     watched.page.close()
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("name", [*PAGES, "search", "messages", "theory/embedding", "reference/errors"])
-def test_text_can_be_read(site: Path, chromium: Any, name: str, scheme: Literal["light", "dark"]) -> None:
+@pytest.mark.parametrize("name", swept([*PAGES, "search", "messages", "theory/embedding", "reference/errors"],
+                                       *KINDS, "printing", "search", "theory/embedding"))
+def test_text_can_be_read(there: Path, chromium: Any, scheme: Literal["light", "dark"]) -> None:
     """Contrast AA of all text: contents, code, tables, formulas; a reader's choice of dark or light counts as well."""
     page = chromium.new_page(color_scheme=scheme)
-    page.goto((site / f"{name}.html").as_uri())
+    page.goto(there.as_uri())
     assert page.evaluate(CONTRAST) == []
     chosen = {"light": "dark", "dark": "light"}[scheme]
     page.evaluate("theme => { document.body.dataset.theme = theme; }", chosen)
@@ -140,7 +157,8 @@ def test_text_that_cannot_be_read_is_found(chromium: Any) -> None:
     page.close()
 
 
-@pytest.mark.parametrize("name", ["index", "gallery", "gallery/puma560", "reference/module", "tutorials/robot_arm_from_urdf"])
+@pytest.mark.parametrize("name", swept(["index", "gallery", "gallery/pendulum", "gallery/puma560", "reference/module",
+                                        "tutorials/robot_arm_from_urdf"], "index", "gallery/pendulum"))
 def test_the_keyboard_reaches_everything(site: Path, chromium: Any, name: str) -> None:
     """Tab goes to every link, button and field of a page that is seen, in a cycle, and each has an outline then."""
     watched = Watched(chromium)
@@ -150,9 +168,9 @@ def test_the_keyboard_reaches_everything(site: Path, chromium: Any, name: str) -
 
 
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.sweep)])
-def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, chromium: Any, request: pytest.FixtureRequest) -> None:
+def test_the_gallery_shows_mechanisms(every: bool, chromium: Any, request: pytest.FixtureRequest) -> None:
     """A picture of each in the grid, and a page with its equations and numbers."""
-    site = build(tmp_path, ()) if every else request.getfixturevalue("site")
+    site: Path = request.getfixturevalue("whole" if every else "site")
     names = [name for name in sd.systems.names() if every or name in SOME]
     page = chromium.new_page()
     page.goto((site / "gallery.html").as_uri())
@@ -172,7 +190,7 @@ def test_the_gallery_shows_mechanisms(every: bool, tmp_path: Path, chromium: Any
         assert (site / "_static" / f"{name}.c").stat().st_size > 1000 and f"_static/{name}.html#play" in text, name
 
 
-@pytest.mark.parametrize("name", ["four_bar", "puma560"])
+@pytest.mark.parametrize("name", swept(["four_bar", "puma560"], "four_bar"))
 def test_mechanisms_of_the_gallery_move(site: Path, chromium: Any, name: str) -> None:
     """The embedded page plays without a click, unless the reader asked for reduced motion."""
     for motion, moves in (("no-preference", True), ("reduce", False)):
@@ -240,8 +258,8 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
         assert len(re.findall(r'src="[^"]*\.gif"', page)) == films, source.stem
 
 
-@pytest.mark.parametrize(("name", "views"), [("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),
-                                             ("wheel_on_a_road", 1)])
+@pytest.mark.parametrize(("name", "views"), swept([("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),
+                                                   ("wheel_on_a_road", 1)], ("wheel_on_a_road", 1)))
 def test_views_of_tutorials_are_drawn(site: Path, chromium: Any, name: str, views: int) -> None:
     """What a notebook showed as a page that turns is drawn on the tutorial's page, without a word on the console."""
     page = chromium.new_page()
