@@ -68,7 +68,8 @@ def leave_to_the_sweep(items: list[pytest.Item]) -> None:
     its parameters, in combinations with what was least used so far."""
     groups: dict[str, list[pytest.Function]] = {}
     for item in items:
-        if isinstance(item, pytest.Function) and hasattr(item, "callspec") and item.get_closest_marker("every_value"):
+        own = isinstance(item, pytest.Function) and hasattr(item, "callspec") and item.get_closest_marker("every_value")
+        if own and not item.get_closest_marker("sweep"):
             groups.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for group in groups.values():
         values = {item: {(name, id(value)) for name, value in item.callspec.params.items()} for item in group}

@@ -119,7 +119,7 @@ def test_curves_are_drawn_where_they_are_described(kind: str) -> None:
     system = ball(True, (sd.contacts.Curve(height, X), {"friction": 0.5}))
     system.defaults = {A: 0.15, K: 1.5} if kind == "parameters" else {}
     end = 0.1 if kind == "rim" else 1.0
-    solution = system.compile(backend="numpy").simulate((0, end), q={"y": 0.5}, u={"x_dot": 0.0 if kind == "rim" else 2.0})
+    solution = system.compile().simulate((0, end), q={"y": 0.5}, u={"x_dot": 0.0 if kind == "rim" else 2.0})
     for page in (data_of(system.show().html), *data_of(solution.view().html)["motions"]):
         (mesh,) = [mesh for mesh in page["meshes"] if mesh["ground"]]
         x, y = vertices(mesh)[::4, :2].T
@@ -138,7 +138,7 @@ def test_curves_are_drawn_where_they_are_described(kind: str) -> None:
 )
 def test_surfaces_are_drawn_in_pages_and_stills(height: Any, tmp_path: Path) -> None:
     system = ball(False, (sd.contacts.Surface(height, X, Y), {"friction": 0.5}))
-    solution = system.compile(backend="numpy").simulate((0, 0.3), q=[0.3, 0.2, 0.5, 1, 0, 0, 0])
+    solution = system.compile().simulate((0, 0.3), q=[0.3, 0.2, 0.5, 1, 0, 0, 0])
     for page in (data_of(system.show().html), *data_of(solution.view().html)["motions"]):
         (mesh,) = [mesh for mesh in page["meshes"] if mesh["ground"]]
         x, y, z = vertices(mesh).T
