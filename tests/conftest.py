@@ -25,6 +25,9 @@ QUICKLY = {
 # Commands of compilers, which workers inherit: for most tests, and for those of generated C.
 QUICK, NATIVE = "SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"
 NATIVE_FOLDERS = "backend", "bench", "gpu"
+# Notebooks that the suite runs: a derivation by hand with proofs, slides compared, a motion under control with films, and an arm
+# from a file, whose views turn. All others are in the sweep.
+NOTEBOOKS = "pendulum_by_hand", "compare_your_slides", "crane_with_controller", "robot_arm_from_urdf"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
 
@@ -64,8 +67,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def leave_to_the_sweep(items: list[pytest.Item]) -> None:
-    """Mark for the sweep what of a test marked `every_value` adds a combination only: what is left has every value of each of
-    its parameters, in combinations with what was least used so far."""
+    """Mark for the sweep most notebooks, and what of a test marked `every_value` adds a combination only: what is left has every
+    value of each of its parameters, in combinations with what was least used so far."""
+    for item in items:
+        if item.path.suffix == ".ipynb" and item.path.stem not in NOTEBOOKS:
+            item.add_marker(pytest.mark.sweep)
     groups: dict[str, list[pytest.Function]] = {}
     for item in items:
         own = isinstance(item, pytest.Function) and hasattr(item, "callspec") and item.get_closest_marker("every_value")

@@ -6,6 +6,7 @@ import ast
 import functools
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import symdyn
 
@@ -29,12 +30,23 @@ def upward() -> set[str]:
     return set(re.findall(r"^- `([\w/.]+)`", _section("Who may import whom"), re.MULTILINE))
 
 
+class File(NamedTuple):
+    """Path in the package, name of the first level, statements at the top, and what tests look at: imports, attributes, `if`."""
+
+    path: str
+    own: str
+    top: list[ast.stmt]
+    nodes: list[ast.AST]
+
+
 @functools.cache
-def files() -> list[tuple[str, str, ast.Module]]:
-    """Path in the package, name of the first level, syntax tree."""
+def files() -> list[File]:
     paths = [(path, path.relative_to(PACKAGE)) for path in sorted(PACKAGE.rglob("*.py"))]
-    return [(inside.as_posix(), inside.parts[0].removesuffix(".py"), ast.parse(path.read_text(encoding="utf-8")))
-            for path, inside in paths if inside.parts[0] not in ("__init__.py", "__main__.py")]
+    trees = [(inside, ast.parse(path.read_text(encoding="utf-8"))) for path, inside in paths
+             if inside.parts[0] not in ("__init__.py", "__main__.py")]
+    kinds = ast.Import, ast.ImportFrom, ast.Attribute, ast.If
+    return [File(inside.as_posix(), inside.parts[0].removesuffix(".py"), tree.body,
+                 [node for node in ast.walk(tree) if isinstance(node, kinds)]) for inside, tree in trees]
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -48,9 +60,9 @@ def imported(node: ast.AST) -> list[str]:
     return []
 
 
-def for_types(tree: ast.Module) -> set[ast.AST]:
+def for_types(nodes: list[ast.AST]) -> set[ast.AST]:
     """Statements that only type checkers read."""
-    guards = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    guards = [n for n in nodes if isinstance(n, ast.If) and isinstance(n.test, ast.Name) and n.test.id == "TYPE_CHECKING"]
     return {inner for guard in guards for inner in ast.walk(guard)}
 
 
@@ -63,9 +75,9 @@ def test_imports_go_down_the_table() -> None:
     """At the top of a file only what stands in an earlier row; inside functions of the listed files also what comes later."""
     rows, allowed = layers(), upward()
     wrong, used = [], set()
-    for path, own, tree in files():
-        top, types = set(tree.body), for_types(tree)
-        for node in ast.walk(tree):
+    for path, own, statements, nodes in files():
+        top, types = set(statements), for_types(nodes)
+        for node in nodes:
             for name in imported(node) if node not in types else ():
                 if name != own and rows[name] >= rows[own]:
                     used.add(path)
@@ -78,20 +90,21 @@ def test_imports_go_down_the_table() -> None:
 def test_public_names_are_for_what_stands_on_them() -> None:
     """Up to the stress tests, the package itself is imported for its version and its folder alone."""
     rows = layers()
-    for path, own, tree in files():
+    for path, own, _, nodes in files():
         if rows[own] <= rows["comparison"]:
-            names = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in ("symdyn", "sd")]
+            names = [n for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)
+                     and n.value.id in ("symdyn", "sd")]
             assert all(n.attr in ("__version__", "__file__") for n in names), path
 
 
 def test_only_the_command_line_runs_the_laboratory() -> None:
-    outside = [f"{path} imports symdyn.{name}" for path, own, tree in files() if own not in ("lab", "cli")
-               for node in ast.walk(tree) for name in imported(node) if name == "lab"]
+    outside = [f"{path} imports symdyn.{name}" for path, own, _, nodes in files() if own not in ("lab", "cli")
+               for node in nodes for name in imported(node) if name == "lab"]
     assert not outside
 
 
 def test_the_recursions_of_the_lecture_are_no_source_of_code() -> None:
     """They print pages, and verification compares the lean ones with them."""
-    readers = {path for path, _, tree in files() for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+    readers = {path for path, _, _, nodes in files() for node in nodes if isinstance(node, ast.ImportFrom)
                and (node.module or "").startswith("symdyn.formulation.textbook") and "formulation/textbook" not in path}
     assert readers == {"formulation/trees/recursive.py"}

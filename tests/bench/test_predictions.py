@@ -8,16 +8,20 @@ import pytest
 
 from symdyn.errors import SymdynError
 from symdyn.lab import predictions
+from tests.helpers import swept
 
 
 @pytest.mark.slow
-def test_predictions_next_to_sweeps(capsys):
+@pytest.mark.parametrize("names", swept(["traces", "short loop traces"], "traces"))
+def test_predictions_next_to_sweeps(names, capsys, monkeypatch):
     pytest.importorskip("pyarrow")
     pytest.importorskip("zarr")
+    monkeypatch.setattr(predictions, "SWEEPS", {name: predictions.SWEEPS[name] for name in names.split()})
     assert predictions.run(rows=100_000, part=0.01) == 0
     said = capsys.readouterr().out.splitlines()
     rows = [line.split("|") for line in said if line.startswith(("short", "loop", "traces"))]
-    assert [int(row[0].split()[1]) for row in rows] == [1000, 64, 81]
+    counts = {"short": 1000, "loop": 64, "traces": 81}
+    assert [int(row[0].split()[1]) for row in rows] == [counts[name] for name in names.split()]
     for row in rows:
         expected, found = map(float, row[3].split())
         assert expected == pytest.approx(found, rel=0.2, abs=0.11)  # MB, to one digit

@@ -14,6 +14,7 @@ import symdyn as sd
 from symdyn.lab.firmware import on_target, tools
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.targets.cmake import deepest, stack_of
+from tests.helpers import swept
 
 # Stacks are counted by gcc.
 pytestmark = pytest.mark.native
@@ -73,7 +74,7 @@ def _run(*command: str | Path) -> str:
 
 
 @needs_cmake
-@pytest.mark.parametrize(("real", "digits"), [("double", 1e-14), ("float", 1e-5)])
+@pytest.mark.parametrize(("real", "digits"), swept([("double", 1e-14), ("float", 1e-5)], ("double", 1e-14)))
 def test_the_installed_package_is_found_and_used(package, tmp_path, real, digits):
     module = sd.systems.two_link_arm().compile(backend="c")
     _run("cmake", "-S", package, "-B", tmp_path / "build", f"-DTWO_LINK_ARM_REAL={real}", "-DTWO_LINK_ARM_TEST=ON",
