@@ -8,6 +8,7 @@ import pytest
 from symdyn.errors import ArgumentError
 from symdyn.lab import many_contacts
 from symdyn.runtime.building.compiler import find_compiler
+from tests.helpers import swept
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -25,7 +26,7 @@ def test_balls_fall_into_a_box_and_keep_the_laws_of_contact() -> None:
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize("n", [20, 40])
+@pytest.mark.parametrize("n", swept([20, 40], 20))
 def test_laws_hold_along_the_normals_at_the_end_of_a_step(n: int) -> None:
     """More balls than are solved to rounding, in two rounds of a step only: the residual that is reported is that of the laws."""
     system, start = many_contacts.box(n)

@@ -16,6 +16,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.lab import gait
 from symdyn.runtime.module import Module
+from tests.helpers import swept
 
 F = sp.Symbol("F")
 # Kelly, SIAM Review 59 (2017), section 5; the pole is a point mass, and turns the other way round here.
@@ -266,8 +267,8 @@ def test_path_and_boundary_conditions() -> None:
     assert around["x"][-1] - around["x"][0] == pytest.approx(1) and around.cost < 1e-12 and around["x"][0] > 2 - 1e-7
 
 
-@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, {"transcription": "shooting"},
-                                     {"method": "slsqp", "intervals": 6}])
+@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, {"method": "slsqp", "intervals": 6},
+                                     *swept([{"transcription": "shooting"}])])
 def test_costs_by_functions(options: dict[str, Any]) -> None:
     """The same motion as by expressions, a free parameter and a free duration included."""
     x, v, m = sp.symbols("x x_dot m")
