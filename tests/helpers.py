@@ -177,7 +177,7 @@ def browser() -> Iterator[Any]:
     if chromium is None:
         pytest.skip("no Chromium on this machine")
     with playwright.sync_playwright() as p:
-        opened = p.chromium.launch(executable_path=chromium, args=[
-            "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"])
+        opened = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--use-angle=swiftshader",
+                                                                                 "--enable-unsafe-swiftshader"])
         yield opened
         opened.close()
