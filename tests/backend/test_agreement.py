@@ -15,6 +15,7 @@ from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler, flags
 from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.tape.evaluate import evaluate
+from tests.helpers import swept
 
 # Relative to the largest entry of a result; the second column is for functions that solve with the mass matrix, where
 # rounding counts in multiples of its condition number.
@@ -96,7 +97,7 @@ def test_modules_agree(compiled: Callable[..., Any]) -> None:
         np.testing.assert_allclose(value, numpy.outputs(0.7, x, None, inputs)[name], rtol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["kitchen_sink", "bricard"])
+@pytest.mark.parametrize("name", ["kitchen_sink", *swept(["bricard"])])
 def test_every_bit_is_that_of_the_tests(name: str, derived: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """The tests let C be compiled with -O0; with what users get, results and whole motions are the same to the last bit."""
     compiler = find_compiler()

@@ -22,6 +22,7 @@ from symdyn.errors import EvaluationError, SymdynError
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.floats import evaluate_rows
+from tests.helpers import swept
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]
 TEMPLATES = Path(sd.__file__).parents[1] / "templates"
@@ -200,7 +201,7 @@ def test_calls_in_parts(name: str, longest: int, divided: Callable[[int], None])
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
-@pytest.mark.parametrize("name", ["four_bar", "bricard", "pendulum_absolute"])
+@pytest.mark.parametrize("name", ["four_bar", *swept(["bricard"]), "pendulum_absolute"])
 def test_written_c_compiles_strictly_and_checks_itself(name: str, write: Callable[..., Path]) -> None:
     functions = ["rhs", "mass_matrix", "C", "C_r", "F_d", "lam", "energy"]
     if name != "bricard":  # which is long
@@ -214,7 +215,7 @@ def test_written_c_compiles_strictly_and_checks_itself(name: str, write: Callabl
     assert len(re.findall(r" ok ", done.stdout)) >= 2 * len(functions)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "bricard"])
+@pytest.mark.parametrize("name", ["four_bar", *swept(["bricard"])])
 def test_written_numpy_checks_itself(name: str, write: Callable[..., Path]) -> None:
     functions = ["rhs", "lam", "C_r"]
     path = write(equations(name), "numpy", functions) / f"{name}.py"

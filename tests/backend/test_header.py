@@ -35,6 +35,7 @@ int main(void) {
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("batch", [False, True])
 @pytest.mark.parametrize("system", ["double_pendulum", "four_bar", "ball"])
 def test_all_that_is_exported_is_declared(system: str, batch: bool) -> None:

@@ -19,6 +19,7 @@ import symdyn as sd
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit, write_source
+from tests.helpers import swept
 
 ALONE = """
 import runpy, sys
@@ -54,7 +55,8 @@ def sink(derived: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) 
     return load(equations, tmp_path_factory.mktemp("numpy"), functions)
 
 
-@pytest.mark.parametrize("name", ["kitchen_sink", "awkward_names", "double_pendulum", "prismatic_chain", "three_link_arm"])
+@pytest.mark.parametrize("name", ["kitchen_sink", "awkward_names",
+                                  *swept(["double_pendulum", "prismatic_chain", "three_link_arm"])])
 def test_selftest_alone(name: str, derived: Callable[..., Any], write: Callable[..., Path]) -> None:
     equations = derived(name)
     functions = [f for f in FUNCTIONS if has_function(equations, f)]

@@ -20,6 +20,7 @@ from symdyn.errors import SymdynError
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit, write_source
+from tests.helpers import swept
 
 HERE = Path(__file__).parent
 SHIPPED = template_folders()[0]
@@ -49,7 +50,7 @@ def test_example_is_small() -> None:
 
 
 @NODE
-@pytest.mark.parametrize("name", ["pendulum", "three_link_arm", "prismatic_chain", "awkward_names"])
+@pytest.mark.parametrize("name", ["pendulum", *swept(["three_link_arm", "prismatic_chain"]), "awkward_names"])
 def test_javascript_checks_itself(name: str, derived: Callable[..., Any], folder: Path, tmp_path: Path) -> None:
     equations = derived(name)
     functions = [f for f in FUNCTIONS if has_function(equations, f)]

@@ -107,13 +107,14 @@ def test_every_executor_gives_the_same_bytes(tmp_path: Path) -> None:
     here = sd.ensemble(module, samples(), np.linspace(0, 1, 5), outcomes, chunk=4, path=tmp_path / "here",
                        sensitivities=["l1", "q2(0)"])
     assert here["grad trace tip"].shape == (12, 5, 2, 2) and here.n_failed == 0 and here.sensitivities == ("l1", "q2(0)")
-    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2, get_context("spawn")) as processes:
+    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(1, get_context("spawn")) as processes:
         for name, executor in (("threads", threads), ("processes", processes)):
             there = sd.ensemble(module, samples(), np.linspace(0, 1, 5), outcomes, chunk=4, path=tmp_path / name,
                                 executor=executor, sensitivities=["l1", "q2(0)"])
             assert there.file.read_bytes() == here.file.read_bytes(), name
 
 
+@pytest.mark.sweep
 def test_dask_gives_the_same_bytes() -> None:
     distributed = pytest.importorskip("distributed")
     here = sd.ensemble(arm(), samples(), T, ["grad end q1"], chunk=4)

@@ -70,6 +70,7 @@ def test_short_gait_of_the_simplest_walker() -> None:
     assert [angle, speed] == pytest.approx([0.19393737, -0.20386693], abs=1e-8)
 
 
+@pytest.mark.sweep
 def test_two_steps_have_the_squares_of_the_multipliers_of_one() -> None:
     """Without the exchange of the legs a period is two steps. The long gait is stable."""
     middle = walker().simulate((0, 1.0), *after_heel_strike(0.20031090, -0.19983247), rtol=1e-10).x[-1]

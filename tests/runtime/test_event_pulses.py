@@ -13,6 +13,7 @@ import symdyn as sd
 from symdyn import panels
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.lab.events import count, draw, measure, system
+from tests.helpers import swept
 
 T = sd.t
 ROOT = np.sqrt(np.log(2))
@@ -139,7 +140,7 @@ def hinged(value: Callable[[Any], Any], backend: str = "numpy") -> Any:
     return s.embedding().compile(backend=backend)
 
 
-@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize("backend", swept(["c", "numpy"], "c"))
 def test_a_narrow_pulse_of_a_reaction_is_warned_of_or_found_with_a_spacing(backend: str) -> None:
     level = hinged(lambda N: N - 2, backend).simulate((0, 3), rtol=1e-10)
     module = hinged(lambda N: sp.exp(-((N - 2) / 0.001) ** 2) - sp.Rational(1, 2), backend)
@@ -167,7 +168,7 @@ def test_a_pulse_in_a_long_value_is_warned_of() -> None:
         module.simulate((0, 0.01))
 
 
-@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize("backend", swept(["c", "numpy"], "c"))
 def test_what_cannot_be_proved_is_warned_of(backend: str) -> None:
     """The value is 1e-6 all the time; bounds of its parts, which cancel, do not show it before a hundred thousandth of a step."""
     s = particle(lambda y: sp.sin(1000 * T) ** 2 + sp.cos(1000 * T) ** 2 - 1 + sp.Rational(1, 10**6))
@@ -210,7 +211,7 @@ def test_ordinary_events_are_proved_without_a_warning(name: str) -> None:
         assert len(rows.t) == len(fine.events[event].t), event
 
 
-@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize("backend", swept(["c", "numpy"], "c"))
 def test_random_pulses_are_found_without_a_warning(backend: str) -> None:
     """Of widths down to a millionth of the span, as in symdyn.lab.events."""
     module = system().embedding().compile(backend=backend)

@@ -13,6 +13,7 @@ import symdyn as sd
 from symdyn import panels
 from symdyn.errors import SimulationWarning
 from symdyn.lab.events import COMPILED, SPAN, TOLERANCES, count, draw, measure, system
+from tests.helpers import swept
 
 G = 9.81
 METHODS = [("c", method) for method in COMPILED] + [("c", "RK45"), ("numpy", "DOP853"), ("numpy", "Radau"), ("numpy", "LSODA")]
@@ -54,7 +55,7 @@ def test_a_threshold_that_is_passed_twice_at_short_distance_ends_the_motion(sear
     assert run.message.startswith("event top ended the motion")
 
 
-@pytest.mark.parametrize(("backend", "method"), SHARED)
+@pytest.mark.parametrize(("backend", "method"), swept(SHARED, *SHARED[:2]))
 def test_what_varies_too_quickly_is_warned_of(backend: str, method: str) -> None:
     """A hundred thousand waves within a step, which stay above zero: whether they do is not resolved."""
     module = thrown(blur=(lambda y: sp.sin(100000 * sd.t) + sp.cos(100000 * sd.t) + sp.Rational(1414215, 1000000), {}))[backend]
@@ -179,7 +180,7 @@ def test_a_value_that_stays_at_zero_or_elsewhere_is_no_event(backend: str, metho
     assert run.success and not any(len(rows.t) for rows in run.events.values()) and not run.doubts
 
 
-@pytest.mark.parametrize(("backend", "method"), SHARED)
+@pytest.mark.parametrize(("backend", "method"), swept(SHARED, *SHARED[:2]))
 def test_random_quantities_have_no_zero_missed(backend: str, method: str) -> None:
     """Sums of sines, pairs of zeros down to 1e-9 of the span apart, thresholds touched from below."""
     module = system().embedding().compile(backend=backend)
@@ -187,7 +188,7 @@ def test_random_quantities_have_no_zero_missed(backend: str, method: str) -> Non
         assert of.zeros > 0 and (of.missed, of.superfluous, of.warned) == (0, 0, 0), (rtol, kind)
 
 
-@pytest.mark.parametrize(("backend", "method"), SHARED)
+@pytest.mark.parametrize(("backend", "method"), swept(SHARED, *SHARED[:2]))
 def test_a_threshold_that_is_hardly_reached_is_passed_once_each_way(backend: str, method: str) -> None:
     """By no more than some thousand units of the last place, so that rounding of the sine passes zero again and again."""
     w, p = sd.parameters("w p")

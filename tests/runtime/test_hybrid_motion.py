@@ -16,6 +16,7 @@ from symdyn.runtime.building.shared import shared
 from symdyn.runtime.contact_laws import Site
 from symdyn.runtime.integrating import contacts, hybrid
 from tests.derivatives.test_periodic_contacts import after_heel_strike, walker
+from tests.helpers import swept
 from tests.runtime.test_rigid_contact import G, ball, planar
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -137,6 +138,8 @@ def four_bar() -> Any:
     return system.compile()
 
 
+OTHERS = ("ball", "radau"), ("walls", "bs54")
+SHORT = "ball", "walls", "belt", "oscillator", "four_bar", "hopper"
 CASES: dict[str, tuple[Any, tuple[float, float], dict[str, Any], int]] = {
     "ball": (lambda: ball(restitution=0.8).compile(), (0, 3), {"q": [0.5]}, 60),
     "walker": (walker, (0, 30), dict(zip("qu", after_heel_strike(0.20031090, -0.19983247), strict=True)), 9),
@@ -157,7 +160,8 @@ def counted(step: Any, what: str, tried: list[str]) -> Any:
     return noted
 
 
-@pytest.mark.parametrize(("name", "method"), [*((name, "dop853") for name in CASES), ("box", "radau"), ("walls", "bs54")])
+@pytest.mark.parametrize(("name", "method"), swept(
+    [*((name, "dop853") for name in CASES), ("box", "radau"), *OTHERS], *((name, "dop853") for name in SHORT), *OTHERS))
 @pytest.mark.filterwarnings("ignore:hopper.* on the border of two modes:symdyn.errors.SimulationWarning")
 def test_motions_are_those_with_every_switch_in_python(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     make, span, start, n = CASES[name]

@@ -70,7 +70,7 @@ def test_accelerations_are_those_of_the_same_motion_in_t(kind: str, form: str) -
 
 @pytest.mark.every_value
 @pytest.mark.parametrize("make", [lambda motion: hung(motion, "Revolute"), moved_ground])
-@pytest.mark.parametrize("absolute", [False, True])
+@pytest.mark.parametrize("absolute", [True, False])
 def test_verify_holds(make, absolute: bool) -> None:
     system = make(z)
     equations = system.augmented(coordinates="absolute") if absolute else system.embedding()

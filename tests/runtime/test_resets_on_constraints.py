@@ -12,6 +12,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import SimulationWarning
+from tests.helpers import swept
 
 METHODS = [("c", "dop853", None), ("c", "radau5", None), ("c", "RK45", None), ("c", "LSODA", None), ("c", "dop853", "baumgarte"),
            ("numpy", "DOP853", None)]
@@ -74,7 +75,7 @@ def test_with_all_joint_speeds_named_all_forms_agree(backend: str, method: str) 
         np.testing.assert_allclose(run.outputs[name], exact.outputs[name], atol=1e-6)
 
 
-@pytest.mark.parametrize("method", ["dop853", "radau5", "taylor", "RK45", "ggl"])
+@pytest.mark.parametrize("method", swept(["dop853", "radau5", "taylor", "RK45", "ggl"], "dop853", "radau5", "ggl"))
 def test_a_turn_in_space_with_euler_parameters_takes_all_speeds_along(method: str) -> None:
     """One freedom, so that the motion after the reset is that in the angle."""
     def system() -> sd.System:

@@ -114,6 +114,7 @@ def in_c_and_in_python(module: Module, *arguments: Any, **options: Any) -> list[
         return [module.simulate(*arguments, max_steps=most, **options) for most in (None, 100_000)]
 
 
+@pytest.mark.every_value
 @EITHER_COMPILER
 @pytest.mark.parametrize("corners", [False, True])
 def test_block_slips_whatever_rounding_makes_of_a_force_that_begins_at_the_bound(

@@ -312,6 +312,7 @@ def falling(backend: str, left: float | None, direction: int) -> Any:
     return s.compile(backend=backend)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=needs_compiler)])
 @pytest.mark.parametrize("direction", [-1, 0])
 @pytest.mark.parametrize("left", [None, 0.5, -1.0])

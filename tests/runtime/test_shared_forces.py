@@ -11,9 +11,12 @@ import symdyn as sd
 from symdyn.errors import SimulationWarning
 from symdyn.runtime.contact_laws import SLIDING, STICKING
 from symdyn.runtime.shared_forces import Cone, shared_forces
+from tests.helpers import swept
 
 G, MASS, STATIC, KINETIC, RATE, LOW = 9.81, 2.0, 0.6, 0.4, 4.0, 0.1
 FIVE = [(-0.2, -0.15), (0.2, -0.15), (0.25, 0.15), (-0.2, 0.2), (0, 0.3)]
+FAR = [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.3), (-0.2, 0.3)]
+EDGE = [(-0.2, 0), (0.2, 0), (0, 0.3)]
 LEGS = [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)]
 
 
@@ -44,10 +47,10 @@ def start(module: Any) -> dict[str, float]:
     return {module.metadata.q[2]: LOW}
 
 
-@pytest.mark.parametrize("friction", [(STATIC, KINETIC), STATIC])
-@pytest.mark.parametrize(("legs", "height"), [
-    (LEGS, -0.05), (LEGS, 0.1), (FIVE, -0.05), ([(-0.2, -0.15), (0.2, -0.15), (0.2, 0.3), (-0.2, 0.3)], -LOW)])
-def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(friction: Any, legs: Any, height: float) -> None:
+@pytest.mark.parametrize(("legs", "height", "friction"), swept(
+    [(legs, height, friction) for legs, height in ((LEGS, -0.05), (LEGS, 0.1), (FIVE, -0.05), (FAR, -LOW))
+     for friction in ((STATIC, KINETIC), STATIC)], (LEGS, -0.05, (STATIC, KINETIC)), (FAR, -LOW, STATIC)))
+def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(legs: Any, height: float, friction: Any) -> None:
     """A force c t above the middle: at c t = mu_s m g, then m x'' = c t - mu_k m g, though legs carry different loads."""
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
     module, begin = table(legs, (*push, 0), (0, 0, height), friction=friction), STATIC * MASS * G / RATE
@@ -59,8 +62,7 @@ def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(frictio
 
 
 @pytest.mark.parametrize(("legs", "push", "height"), [
-    ([(-0.2, 0), (0.2, 0), (0, 0.3)], (1, 0.3), -LOW), ([(-0.2, 0), (0.2, 0), (0.2, 0.3), (-0.2, 0.3)], (0, 1), -LOW),
-    ([(-0.2, 0), (0.2, 0), (0, 0.3)], (1, 0), -0.09)])
+    (EDGE, (1, 0.3), -LOW), *swept([([*EDGE[:2], (0.2, 0.3), (-0.2, 0.3)], (0, 1), -LOW), (EDGE, (1, 0), -0.09)])])
 def test_legs_that_nothing_presses_have_no_friction(legs: Any, push: Any, height: float) -> None:
     """The weight is on the edge of two legs, which the others leave alone until the load presses them."""
     force = RATE * np.array(push) / np.hypot(*push)

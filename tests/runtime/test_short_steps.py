@@ -14,6 +14,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import SimulationWarning
 from symdyn.runtime.integrating import compiled, scipy_run, short_steps
+from tests.helpers import swept
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def stops(module: Any, match: str, **options: Any) -> Any:
     return run
 
 
-@pytest.mark.parametrize(("backend", "method"), EXPLICIT_AND_NOT)
+@pytest.mark.parametrize(("backend", "method"), swept(EXPLICIT_AND_NOT, ("c", "dop853"), ("c", "radau"), ("numpy", "LSODA")))
 def test_friction_in_a_function_of_the_user_stops_where_it_chatters(pushed: Any, backend: str, method: str) -> None:
     """No expression tells where it jumps; rates to either side do."""
     match = (r"block: stopped at t = 0.58\d*: input F chatters: the motion is driven onto a jump at x_dot = \S+ from both "

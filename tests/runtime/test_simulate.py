@@ -29,6 +29,7 @@ from symdyn.errors import (
 )
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.integrating.methods import COMPILED
+from tests.helpers import swept
 
 ROOT = Path(__file__).parents[2]
 
@@ -520,7 +521,8 @@ OPTIONS = {"alone": "{}", "steps": '{"steps": True}', "function": '{"inputs": la
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize(("backend", "options"), [("c", o) for o in OPTIONS] + [("numpy", "alone")])
+@pytest.mark.parametrize(("backend", "options"), swept([*(("c", o) for o in OPTIONS), ("numpy", "alone")],
+                                                       ("c", "alone"), ("numpy", "alone")))
 def test_ctrl_c_ends_a_long_run(backend: str, options: str) -> None:
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 import symdyn as sd
 from symdyn.runtime.module import Module
+from tests.helpers import swept
 
 MASSES, PRESSED = np.array([6.0, 5.0]), 30.0  # kg along x and along y; N
 
@@ -112,7 +113,7 @@ def test_derivatives_go_through_the_beginning_of_a_slip() -> None:
     assert abs(found["mu"] + 9 / 2 * along[0] * (1 + 2 * way / 5)) < 1e-10
 
 
-@pytest.mark.parametrize("kinetic", [0.4, 0.3])
+@pytest.mark.parametrize("kinetic", swept([0.4, 0.3], 0.4))
 def test_derivatives_of_a_skid_that_slips_and_sticks_are_differences_of_its_motion(kinetic: float) -> None:
     """By its masses and by what pushes it; friction turns other masses along x and y, and the skid slips twice by 0.4."""
     m1, m2, f = masses = sd.parameters("m1 m2 f")

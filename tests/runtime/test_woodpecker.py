@@ -129,6 +129,7 @@ def test_period_one_motion_against_matrix_exponentials() -> None:
     assert rest[:2] == pytest.approx([1, 0.839155653], abs=1e-7) and rest[2:].max() < 1e-9
 
 
+@pytest.mark.sweep
 def test_time_stepping_comes_to_the_same_motion() -> None:
     """Across the impact and the slip, of first order in the step."""
     motion = orbit()

@@ -63,7 +63,7 @@ def by_lagrange(n: int) -> Any:
     K = sp.Matrix([[V.diff(a).diff(b) - T.diff(a).diff(b) for b in names] for a in names]).subs(zero)
     # d/dt (M v + D y) - (D^T v - (K - V part) y) = 0
     C = M.diff(psi) * W + D - D.T
-    return sp.lambdify((psi, W), (M, C, K + D.diff(psi) * W))
+    return sp.lambdify((psi, W), (M, C, K + D.diff(psi) * W), cse=True)
 
 
 def _about(axis: int, a: Any) -> sp.Matrix:
@@ -149,7 +149,7 @@ def test_a_frequency_of_two_blades_is_that_of_the_nacelle() -> None:
     assert abs(np.argmax(spectrum) / length - mode.damped_frequency) < 1.5 / length
 
 
-@pytest.mark.slow
+@pytest.mark.sweep
 def test_flap_and_lag_of_flexible_blades_under_their_weight() -> None:
     """The catalogue's turbine with blades that bend and a yaw drive. At a speed that the model prescribes: the motion found
     comes back

@@ -104,7 +104,7 @@ def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude
     assert "fixed frame" in repr(found)
 
 
-@pytest.mark.parametrize("attitude", ["parameters", "angles", "rates", "first"])
+@pytest.mark.parametrize("attitude", [*swept(["parameters", "angles"]), "rates", "first"])
 def test_the_campbell_diagram_of_a_free_rotor_is_of_the_fixed_frame(attitude: str) -> None:
     """At positive and negative speeds; with frame="rotating", position and tilt are seen from the turning axes, at |w - W|."""
     speeds = np.array([-60.0, -7.0, 7.0, 60.0])
@@ -527,7 +527,7 @@ def whirling(W: float, d: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("W", "d"), [
-    (4.0, 0.0), (4.0, 3.0), (10.1, 3.0), (-25.0, 3.0), *swept([(9.9, 3.0), (25.0, 3.0), (-6.0, 3.0)])])
+    (4.0, 0.0), (-25.0, 3.0), *swept([(4.0, 3.0), (10.1, 3.0), (9.9, 3.0), (25.0, 3.0), (-6.0, 3.0)])])
 def test_weight_in_the_plane_of_a_rotor_makes_a_periodic_motion(W: float, d: float) -> None:
     """There is no equilibrium in turning axes, and the message names the call; the motion there goes round once a turn."""
     module = flexible_shaft()

@@ -14,6 +14,7 @@ import scipy.special
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, NoEquilibrium
+from tests.helpers import swept
 
 # Of van der Pol's oscillator with mu = 1. Source: Amore, Boyd and Fernandez, High order analysis of the limit cycle of the van
 # der Pol oscillator, J. Math. Phys. 59 (2018).
@@ -39,7 +40,7 @@ def contraction() -> float:
     return math.exp(found.y[2, -1])
 
 
-@pytest.mark.parametrize(("state", "guess"), [((1.8, 0.3), 6.0), ((1.0, 0.0), 8.0)])
+@pytest.mark.parametrize(("state", "guess"), [((1.8, 0.3), 6.0), *swept([((1.0, 0.0), 8.0)])])
 def test_the_limit_cycle_of_van_der_pol(state: tuple[float, float], guess: float) -> None:
     """Period, multipliers and amplitude, from guesses that are wrong in the first digit."""
     found = van_der_pol().stability(dict(zip(("q", "q_dot"), state, strict=True)), period=guess)

@@ -68,7 +68,12 @@ class Pair(NamedTuple):
     oracle: kane.Accelerations
 
 
-@pytest.fixture(scope="module", params=CASES, ids=repr)
+# The standard convention is that of test_puma560.py, too.
+REPEATED = ({"n": 1}, {"n": 2}, {"track_inertia": False}, {"convention": "standard"}, {"convention": "standard", "general": True})
+
+
+@pytest.fixture(scope="module", ids=repr, params=[
+    pytest.param(case, marks=pytest.mark.sweep) if case.options in REPEATED else case for case in CASES])
 def pair(request: pytest.FixtureRequest) -> Iterator[Pair]:
     case: Case = request.param
     system = sd.systems.get(case.name, **case.options)

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import symdyn as sd
 from symdyn.lab.loop_cases import REFERENCE
 from symdyn.runtime.building.compiler import find_compiler
+from tests.helpers import swept
 
 VARIANTS = [*[(name, {}) for name in sd.systems.names(constrained=True)], ("n_four_bar", {"n": 1}),
             ("particle_on_moving_slope", {"rocking": True}), ("flyball_governor", {"links": "rods"})]
@@ -168,9 +169,10 @@ def window_rows(theta: float, n: int) -> np.ndarray:
 
 
 @pytest.mark.filterwarnings("ignore:.*rounding is magnified there:symdyn.errors.SimulationWarning")
-def test_many_windows_pass_flat_positions_at_every_tolerance(built):
-    """Forty singular values vanish where the uprights lie flat, nowhere else; 24 times the motion goes on there."""
-    n, exact, times = 40, windows_in_step(40), np.linspace(0, 20, 41)
+@pytest.mark.parametrize(("n", "tolerances"), [(12, np.logspace(-8, -10, 4)), *swept([(40, np.logspace(-8, -10, 13))])], ids=str)
+def test_many_windows_pass_flat_positions_at_every_tolerance(built, n, tolerances):
+    """n singular values vanish where the uprights lie flat, nowhere else; 24 times the motion goes on there."""
+    exact, times = windows_in_step(n), np.linspace(0, 20, 41)
     module = built("n_four_bar", n=n)
     for theta, lost in ((math.pi / 2, n), (math.pi / 2 - 0.01, 0), (0.0, 0)):
         state = np.r_[np.full(n + 1, theta), np.full(n, -theta), np.zeros(2 * n + 1)]
@@ -178,7 +180,7 @@ def test_many_windows_pass_flat_positions_at_every_tolerance(built):
         assert values == pytest.approx(np.linalg.svd(window_rows(theta, n), compute_uv=False), abs=1e-14)
         assert (values < 1e-4).sum() == lost
     errors = []
-    for rtol in np.logspace(-8, -10, 13):
+    for rtol in tolerances:
         sol = module.simulate(times, rtol=rtol)
         assert sol.success, sol.message
         assert largest(sol.q[:, :n + 1] - sol.q[:, :1]) <= 1e-10

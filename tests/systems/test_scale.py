@@ -36,6 +36,7 @@ def test_a_chain_of_100_links(chain: sd.System) -> None:
     assert np.abs(tau).max() <= 1e-11 * largest  # no drives: what holds the motion is zero, against weights and inertia
 
 
+@pytest.mark.sweep
 def test_a_random_tree_of_120_bodies_is_derived_and_written() -> None:
     equations = random_tree(120).recursive()
     text = next(iter(emit(equations, "c", ("rhs",), standalone=False, integrator=False).files.values()))
