@@ -12,6 +12,7 @@ import symdyn as sd
 from symdyn.model import joints
 from symdyn.model.joints import Joint, JointMotion
 from symdyn.model.orientation import SEQUENCES
+from tests.helpers import swept
 from tests.model.joint_motion import check_motion
 
 a, b, c, x, y, z = sd.coordinates("a b c x y z")
@@ -50,7 +51,7 @@ JOINTS: dict[str, Callable[[], Joint]] = {
 
 
 @pytest.mark.every_value
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", swept([1, 2], 1))
 @pytest.mark.parametrize("name", JOINTS)
 def test_motion_is_the_derivative_of_the_transform(name: str, seed: int) -> None:
     check_motion(JOINTS[name](), seed)

@@ -12,6 +12,7 @@ import symdyn as sd
 from symdyn.lab.peers.models import turbine_tree
 from symdyn.model import joints
 from symdyn.tape.floats import evaluate_rows
+from tests.helpers import swept
 from tests.oracles.random_trees import random_state, random_tree
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
@@ -22,6 +23,7 @@ FORMULATIONS = ("embedding", "recursive")
 TOLERANCE = 1e-12
 STATES = 3
 TREES = 50
+FEW = range(21)  # have everything; more of them are in the sweep
 KINEMATIC_TREES = 6
 
 CATALOGUE: dict[str, Callable[[], sd.System]] = {
@@ -87,6 +89,7 @@ def compare_dynamics(system: sd.System, formulation: str, seed: int = 0) -> None
         assert_close(found["rhs"][k, n_q:n_q + n_u], oracle.accelerations(q[k], u[k], drive), 0, TOLERANCE * np.linalg.cond(M))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_dynamics_of_the_catalogue(name: str, formulation: str) -> None:
@@ -95,8 +98,9 @@ def test_dynamics_of_the_catalogue(name: str, formulation: str) -> None:
 
 # Every tree in one formulation, every second one in both.
 @pytest.mark.every_value
-@pytest.mark.parametrize(("seed", "formulation"), [(seed, f) for seed in range(TREES) for k, f in enumerate(FORMULATIONS)
-                                                   if seed % 2 == 0 or seed // 2 % 2 == k])
+@pytest.mark.parametrize(("seed", "formulation"), swept([(seed, f) for seed in range(TREES) for k, f in enumerate(FORMULATIONS)
+                                                         if seed % 2 == 0 or seed // 2 % 2 == k],
+                                                        *((seed, FORMULATIONS[seed // 2 % 2]) for seed in FEW)))
 def test_dynamics_of_random_trees(seed: int, formulation: str) -> None:
     compare_dynamics(random_tree(seed), formulation, seed)
 
@@ -133,7 +137,7 @@ def test_kinematics_and_energy_of_random_trees(seed: int, formulation: str) -> N
 
 def test_random_trees_have_everything() -> None:
     """Every joint type of rigid bodies but the one that is a formula, every kind of speeds, branches, bodies on the ground."""
-    trees = [random_tree(seed) for seed in range(TREES)]
+    trees = [random_tree(seed) for seed in FEW]
     found = [joint for tree in trees for joint in tree.joints]
     types = {getattr(joints, name) for name in joints.__all__}
     wanted = {t for t in types if issubclass(t, joints.Joint)} - {joints.Joint, joints.Custom, joints.Modal}

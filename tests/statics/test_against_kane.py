@@ -14,6 +14,7 @@ from sympy.physics import mechanics as me
 from sympy.physics.mechanics import models
 
 import symdyn as sd
+from tests.helpers import swept
 from tests.runtime.test_modes import richardson
 
 T = me.dynamicsymbols._t
@@ -146,7 +147,7 @@ def turned(axis: int, angle: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("angles", "rates"), [
-    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)), ((0.8, 0.0, -0.4), (0.0, 0.0, 3.0)), ((0.8, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)), *swept([((0.8, 0.0, -0.4), (0.0, 0.0, 3.0)), ((0.8, 0.0, 0.0), (0.0, 0.0, 0.0))]),
     ((0.3, 0.25, 1.1), (0.6, -0.5, 2.0)), ((-2.0, -0.7, 0.2), (1.5, 0.3, -1.0)),
 ])
 def test_rolling_disc(angles: tuple[float, ...], rates: tuple[float, ...]) -> None:
@@ -226,7 +227,7 @@ def cart(n: int) -> tuple[Any, Peer]:
 
 
 @pytest.mark.parametrize("moving", [0, 1])
-@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("n", [1, 2, *swept([3])])
 def test_links_on_a_cart(n: int, moving: int) -> None:
     """Any state, any inputs; upright and hanging states are its special cases."""
     module, peer = cart(n)

@@ -367,7 +367,7 @@ EDGES = [(mathieu_a, 0, 1), (mathieu_b, 1, -1), (mathieu_a, 1, 1), (mathieu_b, 2
 
 @pytest.mark.parametrize(("edge", "order", "bounded", "q"), swept(
     [(*edge, q) for edge in EDGES for q in (0.3, 1.0, 2.5) if edge[1] < 3 or q > 1],
-    *[(*edge, q) for edge, q in zip(EDGES, (1.0, 2.5, 0.3, 1.0, 2.5, 2.5), strict=True)]))
+    *[(*edge, q) for edge, q in zip(EDGES[:3], (1.0, 2.5, 0.3), strict=True)]))
 def test_the_edges_of_mathieus_chart_to_a_millionth(edge: Any, order: int, bounded: int, q: float) -> None:
     """Characteristic values a_n(q), b_n(q); the upright pendulum, a < 0, is held up between a_0 and b_1. Source: DLMF 28.2."""
     a = float(edge(order, q))
@@ -457,7 +457,7 @@ RESONANT, QUIET = (11.5, 13.0), (2.0, 7.0, 9.5)
 
 
 @pytest.mark.every_value
-@pytest.mark.parametrize("W", [*RESONANT, *QUIET, -13.0, -7.0])
+@pytest.mark.parametrize("W", [RESONANT[0], QUIET[0], -13.0, *swept([RESONANT[1], *QUIET[1:], -7.0])])
 @pytest.mark.parametrize("n", [3, 4])
 def test_ground_resonance_without_naming_the_blades(n: int, W: float) -> None:
     """Growth, frequencies and multipliers are those of Coleman's equations; the hub's coordinates define the fixed frame."""

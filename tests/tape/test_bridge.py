@@ -16,6 +16,7 @@ from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import COORDINATE
 from symdyn.tape.sympy_bridge import expand, number, record_expression
 from tests import helpers
+from tests.helpers import swept
 
 x, y, z = SYMBOLS = sp.symbols("x y z", real=True)
 half = sp.Rational(1, 2)
@@ -81,7 +82,7 @@ def _random(rng: random.Random, depth: int) -> sp.Expr:
     return rng.choice(_BINARY)(_random(rng, depth - 1), _random(rng, rng.randrange(depth)))
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", swept(range(25), *range(10)))
 def test_random_expressions_there_and_back(seed: int) -> None:
     expression = _random(random.Random(seed), 4)
     recorder, leaves, value = _record(expression)

@@ -17,6 +17,7 @@ from symdyn.tape.node import COORDINATE
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.sympy_bridge import record_expression
 from tests import helpers
+from tests.helpers import swept
 
 x, y = sp.symbols("x y", real=True)
 third = sp.Rational(1, 3)
@@ -69,7 +70,7 @@ def test_every_operation_has_an_example() -> None:
 
 
 @pytest.mark.parametrize("op", OF_OPERATION)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", swept(range(2), 0))
 def test_operation(op: str, seed: int) -> None:
     _check(OF_OPERATION[op], seed)
 
@@ -87,7 +88,7 @@ def _compose(rng: random.Random, depth: int) -> sp.Expr:
     return rng.choice(_PARTS)(_compose(rng, depth - 1), _compose(rng, rng.randrange(depth)))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", swept(range(20), *range(8)))
 def test_random_composition(seed: int) -> None:
     _check(_compose(random.Random(seed), 3), seed)
 

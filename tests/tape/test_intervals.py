@@ -59,6 +59,7 @@ def bounds(value: Any) -> tuple[Tape, Tape]:
     return Tape.of(r, all=np.array([entry, first, second], dtype=object)), Tape.of(r, all=np.array(found, dtype=object))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("name", VALUES)
 @pytest.mark.parametrize("width", [1.0, 1e-1, 1e-3])
 def test_bounds_hold_at_every_point_of_a_line(name: str, width: float) -> None:

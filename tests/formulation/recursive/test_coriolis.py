@@ -12,12 +12,12 @@ from symdyn.formulation.textbook.composite_bodies import composite_bodies
 from symdyn.formulation.textbook.coriolis import coriolis
 from symdyn.formulation.textbook.energy import energy
 from tests import helpers
-from tests.formulation.recursive.trees import at, by_time, check, numeric, state
+from tests.formulation.recursive.trees import at, by_time, check, few_of, numeric, state
 
 CASES = [*[(seed, {}) for seed in range(14)], *[(seed, {"gears": True}) for seed in range(1, 14, 3)]]
 
 
-@pytest.mark.parametrize(("seed", "options"), CASES)
+@pytest.mark.parametrize(("seed", "options"), few_of(CASES))
 def test_coriolis_matrix(seed: int, options: dict[str, bool]) -> None:
     tree = numeric(seed, **options)
     where = state(tree, seed, 60)
@@ -31,7 +31,7 @@ def test_coriolis_matrix(seed: int, options: dict[str, bool]) -> None:
         assert helpers.close(skew, -skew.T)
 
 
-@pytest.mark.parametrize(("seed", "options"), CASES[::3])
+@pytest.mark.parametrize(("seed", "options"), few_of(CASES[::3]))
 def test_in_floats(seed: int, options: dict[str, bool]) -> None:
     here = at(numeric(seed, **options), seed).tree
     u = np.array(list(state(numeric(seed, **options), seed)["u"].values()))
@@ -56,7 +56,7 @@ def test_given_motions_have_none() -> None:
         coriolis(here)
 
 
-@pytest.mark.parametrize(("seed", "options"), CASES[::2])
+@pytest.mark.parametrize(("seed", "options"), few_of(CASES[::2]))
 def test_gravity_load_is_the_derivative_of_the_potential_energy(seed: int, options: dict[str, bool]) -> None:
     """dV/dt = load . u for any u: the load is dV/dq where the speeds are the coordinates' derivatives."""
     tree = numeric(seed, **options)

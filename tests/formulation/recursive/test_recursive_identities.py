@@ -20,7 +20,18 @@ from symdyn.formulation.trees import mass_matrix as composite
 from symdyn.formulation.trees.articulated import Articulated
 from symdyn.formulation.trees.kinematics import Kinematics
 from tests import helpers
-from tests.formulation.recursive.trees import KINDS, RandomTree, at, by_time, check, numeric, random_vector, state
+from tests.formulation.recursive.trees import (
+    FEW,
+    KINDS,
+    RandomTree,
+    at,
+    by_time,
+    check,
+    few_of,
+    numeric,
+    random_vector,
+    state,
+)
 
 SEEDS = range(14)
 ALL = [(seed, options) for options in ({}, {"gears": True}, {"driven": True}) for seed in SEEDS]
@@ -34,12 +45,12 @@ def drawn(seed: int, options: dict[str, bool], digits: int | None = None) -> tup
 
 
 def test_every_kind_of_joint_is_drawn() -> None:
-    names = {j.name.rsplit("_", 1)[0] for seed in SEEDS for j in numeric(seed).model.joints}
+    names = {j.name.rsplit("_", 1)[0] for seed in FEW for j in numeric(seed).model.joints}
     assert names == {kind.replace(" ", "_") for kind in KINDS}
-    assert {len(numeric(seed).model.bodies) for seed in SEEDS} == {2, 3, 4, 5, 6}
+    assert {len(numeric(seed).model.bodies) for seed in FEW} == {2, 3, 4, 5, 6}
 
 
-@pytest.mark.parametrize(("seed", "options"), PROPAGATED)
+@pytest.mark.parametrize(("seed", "options"), few_of(PROPAGATED))
 def test_forward_of_inverse_and_inverse_of_forward(seed: int, options: dict[str, bool]) -> None:
     here, u_dot = drawn(seed, options)
     tree, applied = here.tree, here.applied
@@ -54,14 +65,14 @@ def test_forward_of_inverse_and_inverse_of_forward(seed: int, options: dict[str,
     check(generalized(tree, tau), generalized(tree, applied.joint), 1e-11)
 
 
-@pytest.mark.parametrize(("seed", "options"), PROPAGATED[::4])
+@pytest.mark.parametrize(("seed", "options"), few_of(PROPAGATED[::4]))
 def test_forward_of_inverse_with_30_digits(seed: int, options: dict[str, bool]) -> None:
     here, u_dot = drawn(seed, options, 30)
     tau = inverse_dynamics(here.tree, joint_accelerations(here.tree, u_dot), wrenches=here.applied.wrenches).tau
     assert helpers.close(forward_dynamics(here.tree, tau, here.applied.wrenches).u_dot, u_dot)
 
 
-@pytest.mark.parametrize(("seed", "options"), PROPAGATED)
+@pytest.mark.parametrize(("seed", "options"), few_of(PROPAGATED))
 def test_propagation_is_the_inverse_of_the_mass_matrix(seed: int, options: dict[str, bool]) -> None:
     here, _ = drawn(seed, options)
     tree, applied = here.tree, here.applied
@@ -71,7 +82,7 @@ def test_propagation_is_the_inverse_of_the_mass_matrix(seed: int, options: dict[
     check(forward_dynamics(tree, applied.joint, applied.wrenches).u_dot, np.linalg.solve(M, right.astype(float)), 1e-11)
 
 
-@pytest.mark.parametrize(("seed", "options"), ALL)
+@pytest.mark.parametrize(("seed", "options"), few_of(ALL))
 def test_lean_recursions_give_the_same(seed: int, options: dict[str, bool]) -> None:
     here, u_dot = drawn(seed, options)
     tree, applied = here.tree, here.applied
@@ -85,7 +96,7 @@ def test_lean_recursions_give_the_same(seed: int, options: dict[str, bool]) -> N
     assert found.potential == pytest.approx(kinetic.gravity_potential(), rel=1e-12)
 
 
-@pytest.mark.parametrize(("seed", "options"), [case for case in PROPAGATED if not case[1]])
+@pytest.mark.parametrize(("seed", "options"), few_of([case for case in PROPAGATED if not case[1]]))
 def test_lean_articulated_bodies_give_the_same(seed: int, options: dict[str, bool]) -> None:
     here, _ = drawn(seed, options)
     tree, applied = here.tree, here.applied
@@ -95,7 +106,7 @@ def test_lean_articulated_bodies_give_the_same(seed: int, options: dict[str, boo
     check(forward_dynamics(tree, applied.joint, applied.wrenches).w_dot, lean, 1e-11)
 
 
-@pytest.mark.parametrize(("seed", "options"), ALL)
+@pytest.mark.parametrize(("seed", "options"), few_of(ALL))
 def test_joints_tell_the_same_velocity_product(seed: int, options: dict[str, bool]) -> None:
     """S_ring w by differentiating S, beside the joint's own c: that is seen from the parent, and has omega x v more."""
     here, _ = drawn(seed, options)
@@ -106,7 +117,7 @@ def test_joints_tell_the_same_velocity_product(seed: int, options: dict[str, boo
         assert np.abs((link.c - expected).astype(float)).max() < 1e-13 * max(1, np.abs(link.c.astype(float)).max())
 
 
-@pytest.mark.parametrize(("seed", "options"), ALL[::3])
+@pytest.mark.parametrize(("seed", "options"), few_of(ALL[::3]))
 def test_spatial_acceleration_is_the_rate_of_change_of_velocity(seed: int, options: dict[str, bool]) -> None:
     """d/dt of the components of v, with 60 digits: what the lecture's a is."""
     tree = numeric(seed, **options)
@@ -117,7 +128,7 @@ def test_spatial_acceleration_is_the_rate_of_change_of_velocity(seed: int, optio
     assert helpers.close(by_time(tree, where, u_dot, lambda later: velocities(later).v), np.array(a))
 
 
-@pytest.mark.parametrize(("seed", "options"), ALL[::4])
+@pytest.mark.parametrize(("seed", "options"), few_of(ALL[::4]))
 def test_composite_bodies_are_J_T_M_J(seed: int, options: dict[str, bool]) -> None:
     here, _ = drawn(seed, options)
     tree, kinematics = here.tree, Kinematics(here.tree)
