@@ -1,6 +1,7 @@
 """Contacts in space that share forces: they slip where no distribution of forces holds them any more."""
 
 import warnings
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,25 +15,31 @@ from symdyn.runtime.shared_forces import Cone, shared_forces
 from tests.helpers import swept
 
 G, MASS, STATIC, KINETIC, RATE, LOW = 9.81, 2.0, 0.6, 0.4, 4.0, 0.1
-FIVE = [(-0.2, -0.15), (0.2, -0.15), (0.25, 0.15), (-0.2, 0.2), (0, 0.3)]
-FAR = [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.3), (-0.2, 0.3)]
-EDGE = [(-0.2, 0), (0.2, 0), (0, 0.3)]
-LEGS = [(-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)]
+FIVE = ((-0.2, -0.15), (0.2, -0.15), (0.25, 0.15), (-0.2, 0.2), (0, 0.3))
+FAR = ((-0.2, -0.15), (0.2, -0.15), (0.2, 0.3), (-0.2, 0.3))
+EDGE = ((-0.2, 0), (0.2, 0), (0, 0.3))
+LEGS = ((-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15))
 
 
-def table(legs: Any = LEGS, force: Any = (0, 0, 0), at: Any = (0, 0, 0), torque: float = 0.0,
-          friction: Any = (STATIC, KINETIC)) -> Any:
-    """A rigid body on legs, with a force and a torque about the vertical axis that grow with time."""
+@cache
+def table(legs: tuple[tuple[float, float], ...] = LEGS, friction: Any = (STATIC, KINETIC)) -> Any:
+    """A rigid body on legs, with a force and a torque about the vertical axis that grow with time: see `load`."""
     system = sd.System("table", gravity=[0, 0, -G])
     top = system.add_body("top", mass=MASS, inertia=[0.02, 0.03, 0.04])
     system.add_joint(sd.Free("free", system.ground, top, orientation=sd.EulerAngles("ZYX")))
-    if any(force):
-        system.add_force(top, [f * sd.t for f in force], point=list(at))
-    if torque:
-        system.add_torque(top, [0, 0, torque * sd.t])
+    names = sd.parameters("f_x f_y f_z a_x a_y a_z c_z")
+    system.add_force(top, [f * sd.t for f in names[:3]], point=names[3:6])
+    system.add_torque(top, [0, 0, names[6] * sd.t])
+    system.defaults.update(dict.fromkeys(names, 0.0))
     for k, (x, y) in enumerate(legs):
         system.add_contact(sd.Contact(f"leg_{k}", top, "ground", shape=sd.contacts.Point([x, y, -LOW]), friction=friction))
     return system.compile()
+
+
+def load(force: Any = (0, 0, 0), at: Any = (0, 0, 0), torque: float = 0.0) -> dict[str, float]:
+    """Parameters of `table` for a force at a point and a torque, by time."""
+    return {**{f"f_{x}": float(f) for x, f in zip("xyz", force, strict=True)},
+            **{f"a_{x}": float(a) for x, a in zip("xyz", at, strict=True)}, "c_z": torque}
 
 
 def slips(solution: Any) -> float:
@@ -53,8 +60,8 @@ def start(module: Any) -> dict[str, float]:
 def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(legs: Any, height: float, friction: Any) -> None:
     """A force c t above the middle: at c t = mu_s m g, then m x'' = c t - mu_k m g, though legs carry different loads."""
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
-    module, begin = table(legs, (*push, 0), (0, 0, height), friction=friction), STATIC * MASS * G / RATE
-    solution = module.simulate((0, begin + 1), q=start(module), rtol=1e-10)
+    module, begin = table(legs, friction), STATIC * MASS * G / RATE
+    solution = module.simulate((0, begin + 1), q=start(module), params=load((*push, 0), (0, 0, height)), rtol=1e-10)
     assert slips(solution) == pytest.approx(begin, rel=1e-7)  # rows are softened by 1e-8: compilers differ by 2e-8
     kinetic = friction if isinstance(friction, float) else KINETIC
     after = RATE * ((begin + 1)**3 / 6 - begin**3 / 6 - begin**2 / 2) / MASS - kinetic * G / 2
@@ -62,18 +69,18 @@ def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(legs: A
 
 
 @pytest.mark.parametrize(("legs", "push", "height"), [
-    (EDGE, (1, 0.3), -LOW), *swept([([*EDGE[:2], (0.2, 0.3), (-0.2, 0.3)], (0, 1), -LOW), (EDGE, (1, 0), -0.09)])])
+    (EDGE, (1, 0.3), -LOW), *swept([((*EDGE[:2], (0.2, 0.3), (-0.2, 0.3)), (0, 1), -LOW), (EDGE, (1, 0), -0.09)])])
 def test_legs_that_nothing_presses_have_no_friction(legs: Any, push: Any, height: float) -> None:
     """The weight is on the edge of two legs, which the others leave alone until the load presses them."""
     force = RATE * np.array(push) / np.hypot(*push)
-    module, begin = table(legs, (*force, 0), (0, 0, height)), STATIC * MASS * G / RATE
-    solution = module.simulate(np.linspace(0, begin, 13), q=start(module), rtol=1e-10)
+    module, begin, params = table(legs), STATIC * MASS * G / RATE, load((*force, 0), (0, 0, height))
+    solution = module.simulate(np.linspace(0, begin, 13), q=start(module), params=params, rtol=1e-10)
     forces = np.array([contact.force for contact in solution.contacts.values()])
     assert (np.linalg.norm(forces[:, :-1, 1:], axis=2) <= STATIC * forces[:, :-1, 0] + 1e-8 * MASS * G).all()  # softness
     assert np.abs(solution.u).max() < 1e-9
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # of the border of two modes
-        solution = module.simulate((0, begin + 0.1), q=start(module), rtol=1e-10)
+        solution = module.simulate((0, begin + 0.1), q=start(module), params=params, rtol=1e-10)
     times = [contact.switches[1][0] for contact in list(solution.contacts.values())[:2]]
     assert solution.success and times == pytest.approx([begin, begin], rel=1e-7)
 
@@ -81,8 +88,8 @@ def test_legs_that_nothing_presses_have_no_friction(legs: Any, push: Any, height
 def test_twisted_body_slips_where_the_static_friction_of_all_legs_is_used() -> None:
     """A torque c t: at c t = mu_s m g r of legs at the distance r, then I phi'' = c t - mu_k m g r."""
     r, rate = np.hypot(0.2, 0.15), 1.0
-    module, begin = table(torque=rate), STATIC * MASS * G * np.hypot(0.2, 0.15) / rate
-    solution = module.simulate((0, begin + 0.5), q=start(module), rtol=1e-10)
+    module, begin = table(), STATIC * MASS * G * np.hypot(0.2, 0.15) / rate
+    solution = module.simulate((0, begin + 0.5), q=start(module), params=load(torque=rate), rtol=1e-10)
     assert slips(solution) == pytest.approx(begin, rel=1e-8)
     after = (rate * ((begin + 0.5)**3 / 6 - begin**3 / 6 - begin**2 / 4) - KINETIC * MASS * G * r / 8) / 0.04
     assert solution.q[-1, 3] == pytest.approx(after, rel=1e-6)
@@ -103,16 +110,16 @@ def test_body_pushed_at_its_side_slips_at_the_load_of_limit_analysis() -> None:
             [np.cos(angles), np.sin(angles), np.full(len(angles), -STATIC)])
     found = linprog([*[0] * (3 * n), -1], cones, np.zeros(len(cones)), equilibrium, [0, 0, MASS * G, 0, 0, 0],
                     [(None, None)] * (3 * n + 1))
-    module = table(force=(RATE, 0, 0), at=at)
-    begin = slips(module.simulate((0, 3), q=start(module), rtol=1e-10))
+    module = table()
+    begin = slips(module.simulate((0, 3), q=start(module), params=load((RATE, 0, 0), at), rtol=1e-10))
     assert begin == pytest.approx(-found.fun / RATE, rel=2e-5)
 
 
 def test_forces_stay_within_the_cones_and_balance_the_load_until_then() -> None:
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
-    module = table(force=(*push, 0), at=(0, 0, 0.1))
+    module = table()
     t = np.linspace(0, 2.9, 30)
-    solution = module.simulate(t, q=start(module), rtol=1e-10)
+    solution = module.simulate(t, q=start(module), params=load((*push, 0), (0, 0, 0.1)), rtol=1e-10)
     forces = np.array([contact.force for contact in solution.contacts.values()])
     assert (np.linalg.norm(forces[:, :, 1:], axis=2) <= STATIC * forces[:, :, 0] * (1 + 1e-12)).all()
     assert forces[:, :, 0].sum(axis=0) == pytest.approx(np.full(30, MASS * G), rel=1e-9)
@@ -139,10 +146,9 @@ def test_contacts_in_different_planes_end_the_run_where_their_shares_are_not_dec
 
 
 def test_derivatives_end_where_legs_that_share_forces_slip() -> None:
-    c = sd.parameters("c")
-    module = table(force=(c, 0, 0), at=(0, 0, -0.05))
+    module, params = table(), load((RATE, 0, 0), (0, 0, -0.05))
     with pytest.warns(SimulationWarning, match="share forces and leave their cones"):
-        solution = module.simulate((0, 3.5), q=start(module), params={c: RATE}, rtol=1e-8, sensitivities=[c])
+        solution = module.simulate((0, 3.5), q=start(module), params=params, rtol=1e-8, sensitivities=["f_x"])
     assert not solution.success and solution.t[-1] == pytest.approx(STATIC * MASS * G / RATE, rel=1e-6)
 
 
