@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
+from tests.helpers import swept
 
 pytestmark = pytest.mark.native  # tcc has no vectors
 N = 19  # more than two vectors of eight lanes, and some left over
@@ -49,7 +50,7 @@ def same(many: Any, one: Sequence[Any]) -> None:
             assert np.array_equal(x, reached[t]) if t in reached else np.isnan(x).all()
 
 
-@pytest.mark.parametrize("method", ["dop853", "bs54"])
+@pytest.mark.parametrize("method", ["dop853", *swept(["bs54"])])
 def test_resets_and_stops(ball: Any, method: str) -> None:
     starts = {"q": {"y": np.linspace(0.2, 1.4, N)}, "u": {"y_dot": np.linspace(-6, 3, N)}}
     times = np.linspace(0, 2, 9)
@@ -87,7 +88,7 @@ def test_many_events_without_resets(ball: Any) -> None:
     same(module.simulate_batch(**starts, t=times), one)
 
 
-@pytest.mark.parametrize("method", ["dop853", "bs54"])
+@pytest.mark.parametrize("method", ["dop853", *swept(["bs54"])])
 def test_inputs_by_tables(compiled: Callable[..., Any], method: str) -> None:
     module = compiled("cart_pole", "c")
     name, angle = module.metadata.inputs[0], module.metadata.q[1]

@@ -12,6 +12,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import SimulationWarning
+from tests.helpers import swept
 
 METHODS = [("c", method) for method in ("dop853", "bs54", "radau", "radau5", "auto", "RK45")] + [
     ("numpy", method) for method in ("DOP853", "RK23", "LSODA", "Radau", "BDF", "auto")]
@@ -53,7 +54,7 @@ def test_a_block_that_comes_to_rest_stops_with_what_chatters(rubbing: Any, backe
     assert clock.perf_counter() - begun < 20  # a hundredth of a second of an idle machine's with C
 
 
-@pytest.mark.parametrize(("backend", "method"), METHODS)
+@pytest.mark.parametrize(("backend", "method"), swept(METHODS, *SHARED))
 def test_a_block_on_a_moving_belt_stops_where_it_begins_to_stick(rubbing: Any, backend: str, method: str) -> None:
     """x_ddot + x = 3 from rest: v = 3 sin t reaches the belt's 0.5 m/s at arcsin(1/6)."""
     with pytest.warns(SimulationWarning, match=r"sign\(-v \+ x_dot\) in load friction chatters"):

@@ -106,7 +106,7 @@ def fulfils(D: np.ndarray, b: np.ndarray, sites: list[Site], one: Solved) -> Non
             assert mode.kind == OPEN and np.abs(force).max() == 0
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("n", [1, 2, *swept([3])])
 def test_lemke_finds_what_the_enumeration_finds_in_a_plane(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     stream, missed = np.random.default_rng(10 + n), 0
     for _ in range(60):

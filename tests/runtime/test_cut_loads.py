@@ -50,6 +50,7 @@ def test_a_driven_arm_with_spring_and_damper_in_its_joint(formulation: str) -> N
     np.testing.assert_allclose(sol.cut_load(joint), cut)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("kind", ["dependent coordinate", "gear"])
 def test_the_same_gear_has_the_same_cut_loads_however_it_is_described(kind: str, formulation: str) -> None:

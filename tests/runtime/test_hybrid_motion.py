@@ -35,7 +35,7 @@ def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str
     return found, [hybrid.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("n", [1, 2, *swept([3])])
 def test_modes_are_those_of_all_combinations(n: int) -> None:
     """Random problems with and without friction, with friction of joints, slips and modes that are ruled out."""
     stream, counts = np.random.default_rng(n), dict.fromkeys((-1, 0, 1), 0)

@@ -58,6 +58,7 @@ def states(equations: Equations, count: int = 4) -> np.ndarray:
     return np.random.default_rng(1).uniform(-0.9, 0.9, (count, n))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("kind", ["Prismatic", "Revolute", "Helical", "Universal", "dependent"])
 @pytest.mark.parametrize("form", ["embedding", "recursive", "augmented"])
 def test_accelerations_are_those_of_the_same_motion_in_t(kind: str, form: str) -> None:

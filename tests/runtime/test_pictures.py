@@ -494,7 +494,7 @@ def test_bodies_without_joints_that_are_listed_are_joined_as_they_move() -> None
 # -- films
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "spatial_chain"])
+@pytest.mark.parametrize("name", [*swept(["double_pendulum"]), "spatial_chain"])
 def test_a_film_is_a_gif_with_the_right_speed(name: str, tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
     animate(motion(name), path, fps=10, speed=0.5)

@@ -167,6 +167,7 @@ def test_a_reset_at_a_jump_of_a_held_input_stays(method: str) -> None:
     np.testing.assert_allclose(run.x[2][3:], -run.x[1][3:] / 4, rtol=1e-6)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("backend", "method"), [("c", "dop853"), ("c", "RK45"), ("numpy", "RK45")])
 @pytest.mark.parametrize(("reset", "entry"), [({a.dot: -a.dot / 4, c.dot: c.dot}, "[ac]_dot"), ({a: 1.3, c: 0.9}, "[ac]")])
 def test_a_reset_that_the_constraints_do_not_allow_is_an_error(backend: str, method: str, reset: dict[Any, Any],

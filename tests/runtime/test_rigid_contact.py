@@ -19,6 +19,7 @@ from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Sol
 from symdyn.runtime.integrating import contacts, hybrid
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
+from tests.helpers import swept
 
 X = sp.Symbol("x")
 G = 9.81
@@ -63,6 +64,7 @@ def test_ball_meets_the_times_of_its_impacts_and_their_limit() -> None:
     assert np.array_equal(solution.events["floor_closes"].t, floor.impacts.t)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("friction", [(0.5, 0.5), (0.5, 0.4)])
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_box_on_two_corners_is_pushed_off_where_all_of_its_static_friction_is_used(friction: Any, speed: float) -> None:
@@ -82,7 +84,9 @@ def test_box_on_two_corners_is_pushed_off_where_all_of_its_static_friction_is_us
 
 
 ULPS = [-1000, -20, -3, -1, 0, 1, 2, 3, 20, 1000]
-EITHER_COMPILER = pytest.mark.parametrize("compiler", ["SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"])
+COMPILERS = ["SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"]
+EITHER_COMPILER = pytest.mark.parametrize("compiler", COMPILERS)
+BY_TCC = pytest.mark.parametrize("compiler", swept(COMPILERS, COMPILERS[0]))
 
 
 def ulps_from(value: float, ulps: int) -> float:
@@ -132,7 +136,7 @@ def test_block_slips_whatever_rounding_makes_of_a_force_that_begins_at_the_bound
             assert solution["x_dot"][-1] == pytest.approx(c * end**2 / 2 / mass + (0.5 - 0.4) * G * end, rel=1e-9), ulps
 
 
-@EITHER_COMPILER
+@BY_TCC
 def test_block_is_lifted_whatever_rounding_makes_of_a_force_that_begins_at_its_weight(
         compiler: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The force f + c t upward on a block that slips, f its weight to a few units in the last place: y = c t^3/6m."""
@@ -148,7 +152,7 @@ def test_block_is_lifted_whatever_rounding_makes_of_a_force_that_begins_at_its_w
                                                    rel=1e-9), ulps
 
 
-@EITHER_COMPILER
+@BY_TCC
 def test_tumbling_block_leaves_its_first_corner_whatever_rounding_makes_of_a_gap_without_speed(
         compiler: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its corner is hit without restitution, slips, and is lifted from a gap and a speed that are zero to rounding; the next
@@ -182,7 +186,7 @@ def test_tumbling_block_leaves_its_first_corner_whatever_rounding_makes_of_a_gap
             assert np.abs(solution.u[-1]).max() < 1e-9
 
 
-@pytest.fixture(scope="module", params=["c", "numpy"])
+@pytest.fixture(scope="module", params=["c", *swept(["numpy"])])
 def lifted(request: pytest.FixtureRequest) -> Module:
     """A block on its floor that a force A sin(w t) lifts against drag."""
     amplitude, rate = sd.parameters("A w")
@@ -202,7 +206,7 @@ def test_block_is_lifted_where_nothing_but_its_own_force_accelerates_it(lifted: 
         assert [mode for _, mode in switches] == [SLIDING, OPEN] and switches[1][0] == pytest.approx(begin, abs=1e-9)
 
 
-@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize("backend", ["c", *swept(["numpy"])])
 def test_mass_leaves_a_sphere_at_the_height_that_its_speed_gives(backend: str) -> None:
     """At y = 2/3 + v^2/(3 g r), from energy and m v^2/r = m g y."""
     x, y = sd.coordinates("x y")
@@ -518,6 +522,7 @@ def test_tippe_top_turns_over_and_keeps_jelletts_integral() -> None:
     assert axis[-1, 2] < -0.7 < 0.9 < axis[0, 2]
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 @pytest.mark.parametrize("speed", [0.5, 4.0])
 def test_sphere_that_hits_obliquely_rolls_off_or_slides_on(law: str, speed: float) -> None:
@@ -550,7 +555,7 @@ def test_box_rests_on_a_slope_on_two_corners_and_slides_on_a_smooth_one() -> Non
     assert sliding.q[-1, 0] == pytest.approx(2 * G * (np.sin(tilt) - 0.2 * np.cos(tilt)), rel=1e-11)
 
 
-@pytest.mark.parametrize("law", ["newton", "poisson"])
+@pytest.mark.parametrize("law", ["newton", *swept(["poisson"])])
 def test_tumbling_box_comes_to_rest_and_its_energy_balances(law: str) -> None:
     solution = box(0.3, 0.0, 0.5, law).compile().simulate((0, 3), q=[0, 0.6, 0.3], u=[0.5, 0, 1.0], rtol=1e-11, work=True)
     assert solution.success

@@ -118,7 +118,7 @@ def always(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     ("c", "dop853", 40, {"rtol": 1e-3, "max_step": 0.01}),
     ("c", "dop853", 400, {"inputs": lambda t, x: np.sin(7 * t)}),
     ("numpy", "DOP853", 200, {"rtol": 1e-12}),
-    ("numpy", "Radau", 15, {"rtol": 1e-10}),
+    *swept([("numpy", "Radau", 15, {"rtol": 1e-10})]),
 ])
 def test_steps_that_a_motion_needs_are_not_warned_of(pushed: Any, always: list[int], backend: str, method: str, span: float,
                                                      options: dict[str, Any]) -> None:

@@ -236,6 +236,7 @@ def test_inputs_of_a_system_without(double: Any) -> None:
 
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("error", [ValueError, ZeroDivisionError, RuntimeError, EvaluationError, ArgumentError])
 @pytest.mark.parametrize("method", [None, "radau", "gauss", "RK45", "Radau", "LSODA"])
 def test_what_an_input_function_raises_ends_the_motion(oscillator: Any, error: type[Exception], method: str | None) -> None:

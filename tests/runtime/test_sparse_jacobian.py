@@ -63,6 +63,7 @@ def test_where_factors_are_sparse(cable: Any) -> None:
     assert sd.systems.get("four_bar").compile().places_of_jacobian() is None
 
 
+@pytest.mark.every_value
 @needs_c
 @pytest.mark.parametrize("method", ["Radau", "BDF"])
 @pytest.mark.parametrize("work", [False, True])

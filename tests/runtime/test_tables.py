@@ -77,6 +77,7 @@ def test_a_spline_alone_is_that_of_the_only_input() -> None:
     assert (alone.x == named.x).all() and np.ptp(alone["F"]) > 1
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 @pytest.mark.parametrize(("backend", "method", "most"), [
     ("c", "dop853", 1e-13), ("c", "bs54", 1e-13), ("c", "radau", 1e-8), ("numpy", "DOP853", 1e-13), ("numpy", "RK45", 1e-13),
