@@ -14,6 +14,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Tape
+from tests.helpers import swept
 
 BEAM = sd.Beam([0, 1, 2.5, 4], [3, 2.5, 2, 1.5], ([300, 250, 200, 100], [400, 300, 250, 200]), 3, axis="z", damping_ratio=0.02)
 
@@ -84,7 +85,7 @@ def test_recursive_form_gives_the_same() -> None:
     assert np.abs(a - b).max() < 1e-24 * np.abs(a).max()
 
 
-@pytest.mark.parametrize("form", ["embedding", "recursive"])
+@pytest.mark.parametrize("form", [*swept(["embedding"]), "recursive"])
 def test_quasi_velocities(form: str) -> None:
     equations = getattr(ship(sd.EulerParameters(), velocity="body"), form)()
     assert equations.verify(states=1).passed

@@ -93,6 +93,7 @@ def balance_of_rod(N, angle, spin, friction):
     return N / mass - weight - half * (alpha * np.cos(angle) - spin**2 * np.sin(angle))
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("angle", (0.2, 0.5, 1.3))
 @pytest.mark.parametrize("spin", (0.0, 6.0))
 @pytest.mark.parametrize("friction", (0.5, -0.5, 1.3))

@@ -17,6 +17,7 @@ from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.model.orientation import SEQUENCES
 from symdyn.model.symbols import symbols_of
 from tests import helpers
+from tests.helpers import swept
 
 third, fifth = sp.Rational(1, 3), sp.Rational(1, 5)
 SKEW = sp.Matrix([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
@@ -129,13 +130,13 @@ def test_accelerations_do_not_depend_on_the_speeds(name: str) -> None:
         assert helpers.close(one, other)
 
 
-@pytest.mark.parametrize("name", ["spherical ZYX", "spherical XYX", "free", "free with parameters"])
+@pytest.mark.parametrize("name", [*swept(["spherical ZYX"]), "spherical XYX", *swept(["free"]), "free with parameters"])
 def test_identities(name: str) -> None:
     result = mechanism(QUASI[name][0]).verify(states=2)
     assert result.passed, str(result)
 
 
-@pytest.mark.parametrize("joint", [REBUILT["helical"][0], REBUILT["helical"][1], REBUILT["free"][0],
+@pytest.mark.parametrize("joint", [*swept([REBUILT["helical"][0]]), REBUILT["helical"][1], *swept([REBUILT["free"][0]]),
                                    REBUILT["revolute, turned and shifted at zero"][0]])
 def test_identities_of_helical_and_custom(joint: Callable[..., Any]) -> None:
     result = mechanism(joint).verify(states=2)

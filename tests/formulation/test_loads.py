@@ -15,6 +15,7 @@ from sympy.physics import mechanics as me
 import symdyn as sd
 from symdyn.model.symbols import symbols_of
 from tests import helpers
+from tests.helpers import swept
 from tests.oracles.kane import Scene
 
 t = sd.t
@@ -419,7 +420,7 @@ def euler(down: sp.Matrix, omega: sp.Matrix) -> sp.Matrix:
     return I.inv() * (c.cross(MASS[0] * g * down) + sp.Matrix([F, 1, sp.sin(t)]) - omega.cross(I * omega))
 
 
-@pytest.mark.parametrize("sequence", ["ZYX", "XYX", "YZX"])
+@pytest.mark.parametrize("sequence", ["ZYX", "XYX", *swept(["YZX"])])
 def test_euler_angles(sequence: str) -> None:
     values = helpers.state(equations := top(sd.EulerAngles(sequence), sd.coordinates("a b c")).embedding(), 1)
     N, angles = me.ReferenceFrame("N"), me.dynamicsymbols("a b c")

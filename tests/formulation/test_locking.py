@@ -23,6 +23,7 @@ from symdyn.stress.attitude import free_body, platform
 from symdyn.stress.singular import two_points
 from symdyn.systems import get, names
 from symdyn.tape.evaluate import evaluate
+from tests.helpers import swept
 
 FORMS = ("embedding", "recursive")
 BACKENDS = ("c", "numpy")
@@ -86,12 +87,13 @@ def test_the_first_of_three_angles_may_lock(sequence: str, kind: type) -> None:
         assert found(top(sequence, kind, arms)) == found(top(sequence, kind, arms), solid=True) == [first]
 
 
+LONG = "woodpecker_toy", "bicycle", "land_wind_turbine"
 # The rate of the first Euler angle of a body that may turn any way.
 EULER = {"stewart_platform": "a_dot", **dict.fromkeys(
     ("double_wishbone", "rolling_disc", "bicycle", "floating_wind_turbine", "floating_crane"), "psi_dot")}
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", swept(names(), *(name for name in names() if name not in LONG)))
 def test_mechanisms_of_the_catalogue(name: str) -> None:
     solid = [EULER[name]] if name in EULER else []
     assert found(get(name), solid=True) == solid

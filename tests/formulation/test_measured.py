@@ -89,6 +89,7 @@ def test_accelerations_in_outputs_are_derivatives_of_velocities_along_the_motion
     np.testing.assert_allclose(solution.outputs["accelerations"][1], (values[2] - values[0]) / (2 * h), rtol=1e-6)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("formulation", ("embedding", "recursive", "augmented"))
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_forces_by_points_are_those_by_coordinates(formulation, backend):

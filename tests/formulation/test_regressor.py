@@ -31,6 +31,7 @@ def agree(eq: Equations, seed: int, **given: Any) -> None:
     assert helpers.close(Y @ pi, tau)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("frames", ["body", "parallel"])
 @pytest.mark.parametrize(("name", "options"), CATALOGUE)
 def test_catalogue(name: str, options: dict[str, Any], frames: str) -> None:

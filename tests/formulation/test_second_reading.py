@@ -105,6 +105,7 @@ def test_lumping_and_parallel_frames_change_nothing() -> None:
         assert max(apart(other[name], seen[0][name]) for name in other) < 1e-25
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("system", [machine(3 * time / 2 + sp.sin(time) / 5), moving_ground()], ids=["rotor", "ground"])
 @pytest.mark.parametrize("kind", [TreeQuantities, RecursiveTree])
 def test_power_balance_of_given_motions(system: sd.System, kind: type[TreeQuantities]) -> None:

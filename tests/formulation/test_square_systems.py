@@ -19,6 +19,7 @@ def coupled(n: int) -> tuple[object, list[sp.Expr], list[sp.Expr], sp.Matrix]:
     return equations, q, u, K
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 def test_rates_solve_the_kinematic_equations(n: int, backend: str) -> None:
