@@ -99,6 +99,7 @@ def test_free_rigid_body_with_euler_parameters():
     assert len(names) == 8 and {"p_omega_z_joint", "H_x", "H_y", "H_z", "energy"} < set(names)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("formulation", ["recursive", "embedding"])
 @pytest.mark.parametrize("joint", [sd.Spherical, sd.Free])
 def test_angular_momentum_with_euler_parameters_divides_by_nothing(joint, formulation):

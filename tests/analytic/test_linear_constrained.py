@@ -40,6 +40,7 @@ def defaults(system):
     return {p.name: value for p, value in system.defaults.items()}
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("name", ["skate", "sleigh"])
 @pytest.mark.parametrize("speed", [0, 2.5])
 def test_sleighs_as_in_numbers(name, speed):

@@ -102,7 +102,7 @@ def numbers(source: Source, folder: Path, states: int = 20, name: str = "rhs") -
 
 
 @needs_c
-@pytest.mark.parametrize("name", swept(MADE, "pendulum", "cable", "shuffled"))
+@pytest.mark.parametrize("name", swept(MADE, "cable", "shuffled"))
 def test_loops_give_the_bits_of_straight_line_code(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     rolled, straight = rolled_and_straight(MADE[name](), monkeypatch)
     function = rolled.program.functions[0]

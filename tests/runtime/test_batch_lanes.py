@@ -99,7 +99,7 @@ def test_inputs_by_tables(compiled: Callable[..., Any], method: str) -> None:
     assert not np.array_equal(many.x, module.simulate_batch(**starts, t=times, method=method).x)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "floating_crane"])
+@pytest.mark.parametrize("name", ["four_bar", *swept(["floating_crane"])])
 def test_projection_with_slopes_at_ends(compiled: Callable[..., Any], name: str) -> None:
     """Constraints, and Euler parameters, with a method that evaluates its end before it is moved."""
     module = sd.systems.get(name).compile(backend="c")

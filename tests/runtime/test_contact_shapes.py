@@ -38,7 +38,7 @@ def two_bodies(name: str) -> Any:
         system.add_joint(sd.Cylindrical("other", system.ground, b, axis=[0.6, 0, 0.8], parent_point=[0.1, 0.2, 0.3]))
     system.add_contact(sd.Contact("touch", "a", "b", shape=ROUGH.get(name) or CASES[name][0],
                                   friction=0 if name.startswith("box") else 0.5))
-    return system.compile(backend="numpy")
+    return system.embedding().compile(backend="numpy")
 
 
 def rotations(module: Any, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -206,7 +206,7 @@ def wheel(pair: Any, **law: Any) -> Any:
     body = system.add_body("body", mass=1.0, inertia=0.016)
     system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
     system.add_contact(sd.Contact("touch", body, system.ground, shape=pair, **law))
-    return system.compile()
+    return system.embedding().compile()
 
 
 def ball(pair: Any, **law: Any) -> sd.System:
@@ -280,7 +280,7 @@ def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
         system.add_joint(sd.Planar("free", system.ground, roller, sd.coordinates("x y theta")))
         system.add_joint(sd.Revolute("turn", system.ground, cam, sd.coordinates("phi")))
         system.add_contact(sd.Contact("touch", roller, cam, shape=pair, friction=0.3, restitution=0.2))
-        solution = system.compile().simulate((0, 0.6), **start)
+        solution = system.embedding().compile().simulate((0, 0.6), **start)
         assert [mode for _, mode in solution.contacts["touch"].switches] == ["open", "sticking"]
         return np.asarray(solution.x)
 
@@ -318,6 +318,7 @@ def test_shapes_deep_in_a_surface_move_as_in_the_bowl_that_it_is(shape: Any) -> 
     assert np.abs(runs[0].x - runs[1].x).max() < 1e-8
 
 
+@pytest.mark.sweep
 def test_a_circle_deep_in_a_cam_moves_as_in_the_eccentric_circle_that_it_is() -> None:
     radius = 0.1 * sp.cos(X) + sp.sqrt(0.25 - 0.01 * sp.sin(X)**2)
     pairs = [(SPHERE, Shapes.Cam(radius, X)), (SPHERE, Shapes.Sphere(0.5, [0.1, 0]))]
@@ -350,7 +351,7 @@ def test_what_is_deep_in_a_bent_shape_keeps_its_energy(name: str) -> None:
              else Shapes.Sphere(0.2, inside))
     law = {"law": "compliant", "compliance": Shapes.Compliance(stiffness)}
     system.add_contact(sd.Contact("touch", body, bent, shape=(shape, BENT[name]), **law))
-    module = system.compile()
+    module = system.embedding().compile()
     q = [0.3, 0.1, 0.6, 0.1, 0.2, 0.3, 0] if space else [0.3, 1.6 if "cam" in name else 0.7, 0.3, 0]
     u = [0.5, 0.3, 0, 0.2, 0.1, 0.3, 0.4] if space else [0.2, 0, 0.5, 0.4]
     solution = module.simulate((0, 0.6), q=q, u=u, rtol=1e-10)

@@ -23,6 +23,7 @@ def rotors(*inertias: float) -> sd.System:
     return system
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("side", ["lower", "upper"])
 @pytest.mark.parametrize("formulation", ["embedding", "recursive", "absolute"])
 def test_rotor_bounces_on_its_stop_and_comes_to_rest(side: str, formulation: str) -> None:

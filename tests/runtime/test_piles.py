@@ -28,7 +28,7 @@ def pile() -> sd.Module:
             corner = sd.contacts.Point([x, -HEIGHT / 2])
             system.add_contact(sd.Contact(f"{side}_{k}", body, below, shape=(corner, top), friction=mu))
         below = body
-    return system.compile()
+    return system.embedding().compile()
 
 
 AT = np.array([[0, HEIGHT * (k + 0.5), 0] for k in range(N)]).ravel()

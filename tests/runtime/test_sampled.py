@@ -346,6 +346,7 @@ def block(backend: str) -> Any:
     return s.compile(backend=backend)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=needs_compiler)])
 @pytest.mark.parametrize("period", [0.1, 0.001])
 def test_chattering_is_found_through_short_periods(backend: str, period: float) -> None:

@@ -33,7 +33,7 @@ def table(legs: tuple[tuple[float, float], ...] = LEGS, friction: Any = (STATIC,
     system.defaults.update(dict.fromkeys(names, 0.0))
     for k, (x, y) in enumerate(legs):
         system.add_contact(sd.Contact(f"leg_{k}", top, "ground", shape=sd.contacts.Point([x, y, -LOW]), friction=friction))
-    return system.compile()
+    return system.embedding().compile()
 
 
 def load(force: Any = (0, 0, 0), at: Any = (0, 0, 0), torque: float = 0.0) -> dict[str, float]:

@@ -69,7 +69,8 @@ class Pair(NamedTuple):
 
 
 # The standard convention is that of test_puma560.py, too.
-REPEATED = ({"n": 1}, {"n": 2}, {"track_inertia": False}, {"convention": "standard"}, {"convention": "standard", "general": True})
+REPEATED = ({"n": 1}, {"n": 2}, {"n": 4}, {"track_inertia": False}, {"convention": "standard"},
+            {"convention": "standard", "general": True})
 
 
 @pytest.fixture(scope="module", ids=repr, params=[

@@ -42,6 +42,7 @@ def test_spatial_chain_is_the_published_benchmark():
         [0.001, 0.0015, 0.002, 0.01, 0.02, 0.03, 0.04, 0.05, 0.25, 0.5, 1, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 9.81])
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 @pytest.mark.parametrize("name", sd.systems.names(constrained=False))
 def test_right_hand_side_agrees_with_30_digits(name, backend):
