@@ -6,6 +6,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ModelError
 from symdyn.exact.dimensions import parsed, text, units_of_expressions
+from tests.helpers import swept
 
 m, g, l, k = sd.parameters("m g l k", positive=True)
 
@@ -27,7 +28,7 @@ def test_units_that_are_not_known(unit):
 
 
 @pytest.mark.parametrize("name", [*sd.systems.names(constrained=False), "four_bar", "slider_crank", "rolling_disc", "sleigh",
-                                  "stewart_platform", "andrews_squeezer", "double_wishbone", "floating_crane"])
+                                  *swept(["stewart_platform", "andrews_squeezer", "double_wishbone", "floating_crane"])])
 def test_the_catalogue_agrees(name):
     system = sd.systems.get(name)
     eq = system.recursive() if name in sd.systems.names(constrained=False) else system.augmented()
