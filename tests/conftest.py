@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import importlib
 import os
 import shlex
 import shutil
 import signal
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -30,6 +32,17 @@ NATIVE_FOLDERS = "backend", "bench", "gpu"
 NOTEBOOKS = "pendulum_by_hand", "compare_your_slides", "crane_with_controller", "robot_arm_from_urdf"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
+EARLY = sys.modules.get("numpy")  # imported by another plugin of pytest, before this is read
+
+
+def without_threads() -> None:
+    """Tell the BLAS of a NumPy that is loaded already what QUICKLY says; workers of pytest-xdist load theirs with it."""
+    if EARLY is None or os.environ["OPENBLAS_NUM_THREADS"] != QUICKLY["OPENBLAS_NUM_THREADS"]:
+        return
+    for file in Path(str(EARLY.__file__)).parents[1].glob("numpy.libs/libscipy_openblas64_*"):
+        limit = getattr(ctypes.CDLL(str(file)), "scipy_openblas_set_num_threads64_", None)
+        if limit is not None:
+            limit(1)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -38,6 +51,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     gc.set_threshold(*GC_THRESHOLD)
+    without_threads()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell: tests that press Ctrl-C would wait
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput"):  # the workers of pytest-xdist inherit the environment
