@@ -71,7 +71,7 @@ def test_accelerations_are_those_of_the_same_motion_in_t(kind: str, form: str) -
 
 @pytest.mark.every_value
 @pytest.mark.parametrize("make", [lambda motion: hung(motion, "Revolute"), moved_ground])
-@pytest.mark.parametrize("absolute", [True, False])
+@pytest.mark.parametrize("absolute", [False, True])
 def test_verify_holds(make, absolute: bool) -> None:
     system = make(z)
     equations = system.augmented(coordinates="absolute") if absolute else system.embedding()

@@ -399,7 +399,7 @@ def missed(points: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name, coordinates, options", [
-    ("four_bar", "relative", {}), ("four_bar", "absolute", {}), ("bricard", "relative", {}),
+    *swept([("four_bar", "relative", {})]), ("four_bar", "absolute", {}), ("bricard", "relative", {}),
     *swept([("double_wishbone", "relative", {}),
             ("n_four_bar", "relative", {"n": 3}), ("andrews_squeezer", "relative", {}), ("spatial_slider_crank", "relative", {}),
             ("spatial_slider_crank", "absolute", {}), ("flyball_governor", "relative", {"links": "rods"})])])

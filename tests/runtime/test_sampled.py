@@ -13,6 +13,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.runtime.building.compiler import find_compiler
+from tests.helpers import swept
 
 MASS, K_P, K_D, PERIOD = 2.0, 8.0, 4.0, 0.05
 SCIPY = ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
@@ -356,7 +357,7 @@ def test_chattering_is_found_through_short_periods(backend: str, period: float) 
     assert not sol.success and 0.25 < sol.t[-1] < 0.27 and sol.n_steps < 10_000
 
 
-@pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=needs_compiler)])
+@pytest.mark.parametrize("backend", [*swept(["numpy"]), pytest.param("c", marks=needs_compiler)])
 def test_a_relay_that_switches_at_every_instant_does_not_chatter(backend: str) -> None:
     """The force of 3 N switches with the sign of the speed at each of 500 instants: the steps are short, and no sliding."""
     sol = block(backend).simulate((0, 0.5), inputs={"F": sd.Sampled(lambda t, x: -3 * np.sign(x[1]), 0.001)}, rtol=1e-4)
