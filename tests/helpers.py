@@ -51,8 +51,17 @@ def swept(cases: Iterable[Any], *few: Any) -> list[Any]:
     """Cases of a parametrized test, of which all but a few are left to `pytest -m sweep`."""
     listed = list(cases)
     assert all(one in listed for one in few), f"{few} are not all among {listed}"
-    return [one if one in few else pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.sweep)
+    return [one if one in few else pytest.param(*one if type(one) is tuple else (one,), marks=pytest.mark.sweep)
             for one in listed]
+
+
+def without_constants_of_modules() -> None:
+    """Have hypothesis leave out the numbers of the package's text, which it reads for seconds, and which change from run to
+    run with what is loaded."""
+    from hypothesis.internal.conjecture import providers
+
+    if hasattr(providers, "_get_local_constants"):
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:
