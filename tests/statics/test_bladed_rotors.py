@@ -56,7 +56,7 @@ def matrices(T: sp.Expr, V: sp.Expr, n: int) -> list[sp.Matrix]:
 
 
 def of_nacelle_and_hub() -> list[sp.Matrix]:
-    """Of tilt and yaw."""
+    """M, C, K of tilt and yaw."""
     tilt, yaw, v_tilt, v_yaw = sp.symbols("y1 y2 v1 v2")
     T = (DATA["I"] + 0.5) / 2 * (v_tilt**2 + v_yaw**2)  # with the hub's across the shaft
     T += sp.Rational(1, 2) * (W - v_yaw * sp.sin(tilt)) ** 2  # the hub's inertia about the shaft
@@ -65,7 +65,7 @@ def of_nacelle_and_hub() -> list[sp.Matrix]:
 
 @functools.cache
 def of_a_blade() -> list[sp.Matrix]:
-    """Of tilt, yaw and flap, for the blade at psi."""
+    """M, C, K of tilt, yaw and flap, for the blade at psi."""
     names, rates = sp.symbols("y1:4"), sp.symbols("v1:4")
     tilt, yaw, b = names
     spot = sp.Matrix([DATA["r"] * sp.sin(b), 0, DATA["e"] + DATA["r"] * sp.cos(b)])

@@ -37,7 +37,7 @@ print(sd.systems.get("double_pendulum").embedding().explicit("M_tilde", simplify
 
 @pytest.fixture(scope="module")
 def texts() -> list[str]:
-    """Of a process with another seed, and of this one."""
+    """Texts of a process with another seed, and of this one."""
     root = Path(__file__).parents[2]
     common = {**os.environ, "PYTHONPATH": str(root), "PYTHONIOENCODING": "utf-8"}
     other = "2" if os.environ.get("PYTHONHASHSEED") == "1" else "1"
