@@ -8,20 +8,20 @@ of ten bodies.
 from __future__ import annotations
 
 import heapq
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import groupby
 from operator import attrgetter
 from typing import Any
 
 from symdyn.tape.node import PARAMETER, Node
-from symdyn.tape.passes import rebuild
+from symdyn.tape.passes import ARITHMETIC, rebuild
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, unsigned
 
 # How long an operation takes, in additions.
 _LATENCY = {"add": 1, "sub": 1, "mul": 1, "div": 4, "sqrt": 5, "neg": 0}
 _FUNCTION = 10
+_SUMS = ("add", "sub")
 
 
 def balance(tape: Tape) -> Tape:
@@ -49,31 +49,39 @@ class _Balancer:
         self.inner = _inner_sums(tape)
 
     def tape(self) -> Tape:
+        recorder, new, inner = self.recorder, self.new, self.inner
+        ways = {op: getattr(recorder, op) for op in ARITHMETIC}
         names, checks = self.old.recorder.names, self.old.recorder.checks
-        waiting = (node for node in self.old.steps if unsigned(node) not in self.inner)
-        for section, nodes in groupby(waiting, key=attrgetter("section")):
-            with self.recorder.section(section):
+        for section, nodes in groupby(self.old.steps, key=attrgetter("section")):
+            with recorder.section(section):
                 for node in nodes:
-                    value = self.new[node] = self._value(node)
+                    op, args = node.op, node.args
+                    if (args[0] if op == "neg" else node) in inner:
+                        continue
+                    if op == "leaf":
+                        value: Any = recorder.leaf(args[1], args[0])
+                    elif op in _SUMS and node.mask & ~PARAMETER and self._has_inner(args):
+                        value = self._sum(node)
+                    else:
+                        again = [new[a] if isinstance(a, Node) else a for a in args]
+                        value = ways[op](*again) if op in ways else rebuild(recorder, op, tuple(again))
+                    new[node] = value
                     if isinstance(value, Node):
                         if node in names:
-                            self.recorder.name(names[node], value)
-                        if node in checks and node.op == "guard":
-                            self.recorder.positive(unsigned(value), checks[node])
+                            recorder.name(names[node], value)
+                        if node in checks and op == "guard":
+                            recorder.positive(unsigned(value), checks[node])
                         elif node in checks:
-                            self.new[node] = self.recorder.positive(value, checks[node])
-        return Tape(self.recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
-                                    for name, o in self.old.outputs.items()})
-
-    def _value(self, node: Node) -> Any:
-        if node.op == "leaf":
-            return self.recorder.leaf(node.args[1], node.args[0])
-        if node.op in ("add", "sub") and node.mask & ~PARAMETER:
-            return self._sum(node)
-        return rebuild(self.recorder, node.op, tuple(self._of(a) for a in node.args))
+                            new[node] = recorder.positive(value, checks[node])
+        return Tape(recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
+                               for name, o in self.old.outputs.items()})
 
     def _of(self, value: Any) -> Any:
         return self.new[value] if isinstance(value, Node) else value
+
+    def _has_inner(self, terms: tuple[Any, ...]) -> bool:
+        """Whether a sum has more than its two terms, whose order is of no account."""
+        return any(unsigned(term) in self.inner for term in terms)
 
     def _sum(self, node: Node) -> Any:
         """The terms, two by two, those that are ready first."""
@@ -107,40 +115,44 @@ class _Balancer:
 
     def _time(self, value: Any) -> int:
         """When a value is ready."""
-        if not isinstance(value, Node) or value.op == "leaf" or not value.mask & ~PARAMETER:
+        if not isinstance(value, Node):
             return 0
-        known = self.ready.get(value)
+        ready = self.ready
+        known = ready.get(value)
         if known is not None:
             return known
         stack = [value]
         while stack:
             node = stack[-1]
-            waiting = [a for a in node.args if isinstance(a, Node) and a not in self.ready]
-            if waiting:
-                stack += waiting
+            if node.op == "leaf" or not node.mask & ~PARAMETER:
+                ready[stack.pop()] = 0
                 continue
-            stack.pop()
-            running = node.op != "leaf" and node.mask & ~PARAMETER
-            before = max((self.ready[a] for a in node.args if isinstance(a, Node)), default=0)
-            self.ready[node] = before + _LATENCY.get(node.op, _FUNCTION) if running else 0
-        return self.ready[value]
-
-
-def _inner_sums(tape: Tape) -> Mapping[Node, None]:
-    """Sums that are used once, by another sum, and have neither a name nor a check: their order is free."""
-    uses: Counter = Counter()
-    for node in tape.steps:
-        if node.op != "neg":
+            waiting, before = False, 0
             for a in node.args:
                 if isinstance(a, Node):
-                    uses[a.args[0] if a.op == "neg" else a] += 1
-    uses.update(core for o in tape.outputs.values() for core in map(unsigned, o.entries) if isinstance(core, Node))
-    kept = {**tape.recorder.names, **tape.recorder.checks}
-    inner: dict[Node, None] = {}
+                    time = ready.get(a)
+                    if time is None:
+                        waiting = True
+                        stack.append(a)
+                    elif time > before:
+                        before = time
+            if not waiting:
+                ready[stack.pop()] = before + _LATENCY.get(node.op, _FUNCTION)
+        return ready[value]
+
+
+def _inner_sums(tape: Tape) -> set[Node]:
+    """Sums that are used once, by another sum, and have neither a name nor a check: their order is free."""
+    once: dict[Node, bool] = {}
     for node in tape.steps:
-        if node.op in ("add", "sub") and node.mask & ~PARAMETER:
-            for core in map(unsigned, node.args):
-                if (isinstance(core, Node) and core.op in ("add", "sub") and core.mask & ~PARAMETER and uses[core] == 1
-                        and core not in kept):
-                    inner[core] = None
-    return inner
+        if node.op != "neg":
+            free = node.op in _SUMS and bool(node.mask & ~PARAMETER)
+            for a in node.args:
+                if isinstance(a, Node):
+                    core = a.args[0] if a.op == "neg" else a
+                    if core.op in _SUMS:
+                        once[core] = free and core not in once
+    names, checks = tape.recorder.names, tape.recorder.checks
+    results = {unsigned(e) for o in tape.outputs.values() for e in o.entries}
+    return {node for node, free in once.items() if free and node.mask & ~PARAMETER and node not in names
+            and node not in checks and node not in results}

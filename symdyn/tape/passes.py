@@ -11,11 +11,13 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, reachable, unsigned
 from symdyn.tape.walk import Arithmetic, walk
 
-_ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
+ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
 
 
 def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
     """Record the operation again, with folding."""
+    if op in ARITHMETIC:
+        return getattr(recorder, op)(*args)
     if op == "call":
         items = recorder.call(args[0], args[1:])
         return items[0].args[0] if isinstance(items[0], Node) else items
@@ -23,8 +25,6 @@ def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
         return recorder.guarded(*args)
     if op == "item":
         return recorder.item(*args)
-    if op in _ARITHMETIC:
-        return getattr(recorder, op)(*args)
     return recorder.apply(op, *args)
 
 

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import lru_cache
 from math import isqrt
 from typing import Any
 
@@ -31,6 +32,16 @@ _EXACT: dict[str, Callable] = {
     "abs": abs, "sign": lambda a: (a > 0) - (a < 0), "floor": math.floor, "ceil": math.ceil, "min": min, "max": max,
     "lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
     "not": operator.not_, "and": lambda a, b: a and b, "or": lambda a, b: a or b}
+
+
+@lru_cache(maxsize=64)
+def _ends(shape: tuple[int, ...], axes: bool) -> tuple[str, ...]:
+    """Ends of the names of the entries of an array."""
+    if not shape:
+        return ("",)
+    if axes:
+        return tuple("_" + "".join("xyz"[k] for k in position) for position in np.ndindex(shape))
+    return tuple("_" + "_".join(str(k + 1) for k in position) for position in np.ndindex(shape))
 
 
 class Recorder:
@@ -64,11 +75,9 @@ class Recorder:
         axes   number the entries x, y, z instead of 1, 2, 3
         """
         array = np.asarray(value, dtype=object)
-        for position in np.ndindex(array.shape):
-            node = array[position]
+        for node, end in zip(array.ravel().tolist(), _ends(array.shape, axes), strict=True):
             if isinstance(node, Node) and node.op not in _SELF_EXPLAINING and node not in self.names:
-                suffix = "".join("xyz"[k] for k in position) if axes else "_".join(str(k + 1) for k in position)
-                self.names[node] = f"{name}_{suffix}" if suffix else name
+                self.names[node] = f"{name}{end}"
         return value
 
     @contextmanager
@@ -128,28 +137,27 @@ class Recorder:
 
     def add(self, a: Any, b: Any) -> Any:
         if not isinstance(a, Node):
-            a = exact(a)
-            if not isinstance(b, Node):
-                return exact(a + exact(b))
             a, b = b, a
+        if not isinstance(a, Node):
+            return exact(exact(a) + exact(b))
         if not isinstance(b, Node):
-            b = exact(b)
+            b = b if type(b) is int else exact(b)
             if b == 0:
                 return a
             if a.op == "add" and not isinstance(a.args[0], Node):
                 return self.add(a.args[1], exact(a.args[0] + b))
-            return self._record("add", b, a)
+            return self._make("add", (b, a), a.mask)
         if a.op == "neg":
             return self.sub(b, a.args[0])
         if b.op == "neg":
             return self.sub(a, b.args[0])
         if a is b:
             return self.mul(2, a)
-        return self._record("add", a, b) if a.index < b.index else self._record("add", b, a)
+        return self._make("add", (a, b) if a.index < b.index else (b, a), a.mask | b.mask)
 
     def sub(self, a: Any, b: Any) -> Any:
         if not isinstance(b, Node):
-            return self.add(a, -exact(b))
+            return self.add(a, -(b if type(b) is int else exact(b)))
         if not isinstance(a, Node):
             return self.add(self.neg(b), a)
         if b.op == "neg":
@@ -158,16 +166,16 @@ class Recorder:
             return self.neg(self.add(a.args[0], b))
         if a is b:
             return 0
-        return self._record("sub", a, b) if a.index < b.index else self.neg(self._record("sub", b, a))
+        mask = a.mask | b.mask
+        return self._make("sub", (a, b), mask) if a.index < b.index else self.neg(self._make("sub", (b, a), mask))
 
     def mul(self, a: Any, b: Any) -> Any:
         if not isinstance(a, Node):
-            a = exact(a)
-            if not isinstance(b, Node):
-                return exact(a * exact(b))
             a, b = b, a
+        if not isinstance(a, Node):
+            return exact(exact(a) * exact(b))
         if not isinstance(b, Node):
-            b = exact(b)
+            b = b if type(b) is int else exact(b)
             if b == 0:
                 return 0
             if b == 1:
@@ -176,14 +184,14 @@ class Recorder:
                 return self.neg(self.mul(a, -b)) if b < 0 else self.neg(self.mul(a.args[0], b))
             if a.op == "mul" and not isinstance(a.args[0], Node):
                 return self.mul(a.args[1], exact(a.args[0] * b))
-            return self._record("mul", b, a)
+            return self._make("mul", (b, a), a.mask)
         if a.op == "neg":
-            return self.neg(self.mul(a.args[0], b))
+            return self.mul(a.args[0], b.args[0]) if b.op == "neg" else self.neg(self.mul(a.args[0], b))
         if b.op == "neg":
             return self.neg(self.mul(a, b.args[0]))
         if a is b and a.op == "sqrt":
             return a.args[0]
-        return self._record("mul", a, b) if a.index < b.index else self._record("mul", b, a)
+        return self._make("mul", (a, b) if a.index < b.index else (b, a), a.mask | b.mask)
 
     def div(self, a: Any, b: Any) -> Any:
         if not isinstance(b, Node):
@@ -205,7 +213,7 @@ class Recorder:
     def neg(self, a: Any) -> Any:
         if not isinstance(a, Node):
             return -exact(a)
-        return a.args[0] if a.op == "neg" else self._record("neg", a)
+        return a.args[0] if a.op == "neg" else self._make("neg", (a,), a.mask)
 
     def pow(self, base: Any, exponent: Any) -> Any:
         """Integer powers by repeated squaring, half-integer ones by a square root."""

@@ -260,7 +260,9 @@ def test_names_and_sections(r: Recorder, xyz: list[Node]) -> None:
     r.name("w", np.array([[b, c]], dtype=object), axes=True)
     r.name("late", a)
     r.name("sign", -c)
-    assert r.names == {a: "v_1", b: "w_xx", c: "w_xy"}
+    r.name("s", r.mul(x, z))
+    r.name("n", np.array([[x + z, 0], [1, y + z]], dtype=object))
+    assert r.names == {a: "v_1", b: "w_xx", c: "w_xy", x * z: "s", x + z: "n_1_1", y + z: "n_2_2"}
 
 
 def test_repr_tells_the_operation(r: Recorder, xyz: list[Node]) -> None:
