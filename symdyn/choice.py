@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
@@ -21,7 +21,7 @@ from symdyn.functions.content import with_open_contacts
 from symdyn.kinds import flag
 from symdyn.model.record import Model, joint_speeds
 from symdyn.shown import shown
-from symdyn.tape.cycles import WIDTH, Schedule, schedule
+from symdyn.tape.cycles import LATENCY, WIDTH, Schedule, schedule
 from symdyn.tape.node import PARAMETER
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape
@@ -115,6 +115,8 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto", coordina
         from symdyn.timing.side_by_side import times_side_by_side
 
         times = times_side_by_side([d.equations for d in derived])
+    if len(derived) == 1 and not tune:
+        return replace(derived[0].equations, candidates=_Only(derived[0].equations))
     table = [d.candidate(t) for d, t in zip(derived, times, strict=True)]
     best = min(range(len(table)), key=lambda k: table[k].time)
     return replace(derived[best].equations, candidates=tuple(replace(c, chosen=k == best) for k, c in enumerate(table)))
@@ -150,21 +152,27 @@ def formulated(system: System, formulation: str = "auto", tune: bool = False,
 
 @dataclass(frozen=True)
 class Derived:
-    """Equations with the tape of their right-hand side as it is emitted, what it takes, and nanoseconds predicted."""
+    """Equations with the tape of their right-hand side as it is emitted."""
 
     equations: MotionEquations
     tape: Tape
-    run: Schedule
-    predicted: float
 
     @classmethod
     def of(cls, equations: MotionEquations) -> Derived:
-        """Count and predict; terms as in `terms`. Rigid contacts are open: a motion pays nothing for those that stay so."""
-        tape = with_open_contacts(equations, "rhs")
-        run = schedule(tape)
-        return cls(equations, tape, run, time_of(terms(tape, run)))
+        """Rigid contacts are open: a motion pays nothing for those that stay so."""
+        return cls(equations, with_open_contacts(equations, "rhs"))
 
-    def candidate(self, seconds: float | None) -> Candidate:
+    @cached_property
+    def run(self) -> Schedule:
+        """What an evaluation takes."""
+        return schedule(self.tape)
+
+    @cached_property
+    def predicted(self) -> float:
+        """Nanoseconds of one evaluation; terms as in `terms`."""
+        return time_of(terms(self.tape, self.run))
+
+    def candidate(self, seconds: float | None = None) -> Candidate:
         """Its line of the table."""
         tape = self.tape
         return Candidate(self.equations.formulation, self.equations.frames, tape.operations,
@@ -177,6 +185,23 @@ class Derived:
 
     def _counts(self) -> tuple[object, ...]:
         return self.tape.count(), self.tape.count_prologue(), self.tape.longest_chain(), self.run
+
+
+class _Only(Sequence[Candidate]):
+    """The table of the only candidate, whose time is predicted when the table is looked at: there was nothing to choose."""
+
+    def __init__(self, equations: MotionEquations) -> None:
+        self._equations = equations
+
+    @cached_property
+    def _table(self) -> tuple[Candidate, ...]:
+        return (replace(Derived.of(self._equations).candidate(), chosen=True),)
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, k: Any) -> Any:
+        return self._table[k]
 
 
 def derived_in_frames(derive: Callable[[Model, str], MotionEquations], model: Model) -> list[Derived]:
@@ -201,9 +226,24 @@ def _worth_comparing(model: Model, formulation: str, coordinates: str) -> list[D
 
 
 def _mass_matrix_can_win(model: Model, recursions: Sequence[Derived]) -> bool:
+    if len(recursions) == 1 and hopeless(model, recursions[0]):
+        return False
     best = min(recursions, key=lambda d: d.predicted)
     ahead = PROMISING if best.tape.operations > LONG else 1
     return least_time_with_mass_matrix(model, best) < ahead * best.predicted
+
+
+def hopeless(model: Model, recursion: Derived) -> bool:
+    """Whether factors of the mass matrix alone take longer than the recursion at the most, as in long chains."""
+    return time_of({"cycles": _factors_alone(model, recursion) / WIDTH}) > most_time(recursion.tape)
+
+
+def most_time(tape: Tape) -> float:
+    """Nanoseconds that a tape is predicted to take at the most: as if all its steps waited for each other."""
+    counts = tape.count()
+    operations = sum(counts.values())
+    return time_of({"cycles": operations * max(LATENCY.values()), "beyond": operations, "sines": 1,
+                    "angles": counts.get("trig", 0)})
 
 
 def least_time_with_mass_matrix(model: Model, recursion: Derived) -> float:
@@ -213,10 +253,19 @@ def least_time_with_mass_matrix(model: Model, recursion: Derived) -> float:
     instructions of the recursion (0.52 to 1.73 of them in the systems of `symdyn bench costs` with more than two speeds); if all
     pivots are constant, solving alone is left.
     """
-    least = float(solving_instructions(model))
-    if any(pivot.mask & ~PARAMETER for pivot in recursion.equations.recorder.checks):
-        least += factorizing_instructions(model) + recursion.run.instructions / 2
+    least = float(_factors_alone(model, recursion))
+    if _pivots_change(recursion):
+        least += recursion.run.instructions / 2
     return time_of(terms(recursion.tape, Schedule(round(least), round(least / WIDTH))))
+
+
+def _factors_alone(model: Model, recursion: Derived) -> int:
+    """Instructions of factorizing the mass matrix, where its pivots are no constants, and of solving with it."""
+    return solving_instructions(model) + (factorizing_instructions(model) if _pivots_change(recursion) else 0)
+
+
+def _pivots_change(recursion: Derived) -> bool:
+    return any(pivot.mask & ~PARAMETER for pivot in recursion.equations.recorder.checks)
 
 
 def factorizing_instructions(model: Model) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ from symdyn.formulation.trees.embedding import embed
 from symdyn.formulation.trees.recursive import recursive
 from symdyn.functions.tapes import function_tape
 from symdyn.lab.random_tree import random_tree
+from symdyn.lab.rolled import cable
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.recall import recall
 from symdyn.tape.cycles import fused_products
@@ -163,6 +165,36 @@ def test_large_systems_are_not_derived_with_a_mass_matrix(make: Any, monkeypatch
     monkeypatch.setattr(choice, "embed", lambda *_: pytest.fail("derived the mass matrix"))
     equations = make().equations()
     assert equations.formulation == "recursive" and len(equations.candidates) == 1
+
+
+@pytest.mark.parametrize("system", [systems.get("n_link_pendulum", n=4), systems.get("spatial_chain", n=3), arms(2, 3),
+                                    systems.four_bar()], ids=lambda s: s.name)
+def test_no_prediction_is_above_the_most(system: sd.System) -> None:
+    tape = function_tape(system.equations(), "rhs")
+    assert 0 < choice.predicted_time(tape) <= choice.most_time(tape)
+
+
+def test_where_the_mass_matrix_is_hopeless_nothing_is_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = systems.get("n_link_pendulum", n=24).check()
+    recursion = choice.Derived.of(recursive(model, "parallel"))
+    assert not choice.hopeless(model, recursion)
+    monkeypatch.setattr(choice, "most_time", lambda tape: 1.0)
+    monkeypatch.setattr(choice, "LONG", 100)
+    monkeypatch.setattr(choice, "schedule", lambda tape: pytest.fail("predicted a time"))
+    equations = choose(model)
+    assert equations.formulation == "recursive"
+    monkeypatch.undo()
+    assert taken(equations).predicted == choice.predicted_time(function_tape(equations, "rhs"))
+
+
+def test_the_only_formulation_is_predicted_when_its_table_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(choice, "schedule", lambda tape: pytest.fail("predicted a time"))
+        equations = choose(cable(3).check(), formulation="recursive")
+    tape = function_tape(equations, "rhs")
+    assert len(equations.candidates) == 1 and equations.candidates[0] is next(iter(equations.candidates))
+    assert pickle.loads(pickle.dumps(equations)).candidates == tuple(equations.candidates)
+    assert taken(equations).predicted == choice.predicted_time(tape) and taken(equations).chain == tape.longest_chain()
 
 
 # -- tuning

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     pass
 
 
-def _derived_again(again: Callable[[], Equations], simplify_seconds: float, candidates: tuple[Any, ...]) -> Equations:
+def _derived_again(again: Callable[[], Equations], simplify_seconds: float, candidates: Sequence[Any]) -> Equations:
     return replace(again(), simplify_seconds=simplify_seconds, candidates=candidates)
 
 
@@ -108,7 +108,7 @@ class Equations(EquationsFacade):
     again: Callable[[], Equations] | None = None
     simplify_seconds: float = 10.0
     frames: str = "body"
-    candidates: tuple[Any, ...] = ()
+    candidates: Sequence[Any] = ()
     constraints: tuple[str, ...] = ()
     holonomic: tuple[bool, ...] = ()
     bodies: tuple[str, ...] = ()
@@ -135,7 +135,7 @@ class Equations(EquationsFacade):
         if self.again is None:
             raise SymdynError(f"{self.name}: these equations were put together by hand, without what they are derived from, and "
                               "cannot be pickled or copied; pickle the description and derive them there")
-        return _derived_again, (self.again, self.simplify_seconds, self.candidates)
+        return _derived_again, (self.again, self.simplify_seconds, tuple(self.candidates))
 
     def quantity(self, name: str) -> np.ndarray:
         """A quantity, or a named output, as an array of nodes and numbers; recorded on first use.

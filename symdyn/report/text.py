@@ -133,4 +133,4 @@ def report(equations: Equations, backend: str, fallback: str = "", source: Sourc
         notes.append(f"{', '.join(left_out)}: not counted, as their entries grow with the square of the {len(s.speeds)} speeds; "
                      "they are derived when they are asked for")
     return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
-                  tuple(notes), equations.candidates, rolled=rolled_rows(source) if source is not None else ())
+                  tuple(notes), tuple(equations.candidates), rolled=rolled_rows(source) if source is not None else ())
