@@ -12,7 +12,7 @@ import sympy as sp
 from symdyn.errors import UnsupportedExpression
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Coordinate, GivenMotion, GivenRate, time
+from symdyn.model.symbols import Coordinate, GivenMotion, GivenRate, flat, time
 from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.recorder import Recorder
@@ -50,6 +50,9 @@ class TapeAlgebra:
 
     def expression(self, e: Any) -> Any:
         """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""
+        known = self._memory.get(e)
+        if known is not None:
+            return known
         quantities = [q for q in quantities_in([e]) if q not in self.leaves and q not in self._memory]
         if quantities and self.measured is not None:
             # Not among the leaves: these are printed under the names of their symbols.
@@ -62,7 +65,7 @@ class TapeAlgebra:
 
     def constants(self, values: Iterable[Any]) -> np.ndarray:
         """A vector of expressions on the tape."""
-        entries = values.flat() if isinstance(values, sp.MatrixBase) else values
+        entries = flat(values) if isinstance(values, sp.MatrixBase) else values
         return vector(*[self.expression(e) for e in entries])
 
     def matrix(self, values: sp.MatrixBase) -> np.ndarray:

@@ -195,25 +195,25 @@ class _Checker:
             else:
                 edges[child] = (joint, parent)
         order: list[tuple[Joint, int, int]] = []
-        placed = {-1}
-        waiting = dict(edges)
-        while waiting:
-            ready = [c for c, (_, p) in waiting.items() if p in placed]
-            if not ready:
-                looped = sorted(c for c in waiting if _in_loop(c, edges))
-                if looped:
-                    names = ", ".join(repr(s.bodies[c].name) for c in looped)
-                    self.faults.append(f"bodies {names} hang on each other in a loop and not on the ground; "
-                                       "join one of them to the ground and close the loop with close_loop")
-                break
-            for c in ready:
-                joint, p = waiting.pop(c)
-                order.append((joint, p, c))
-                placed.add(c)
+        given = {c: k for k, c in enumerate(edges)}
+        children: dict[int, list[int]] = {}
+        for c, (_, p) in edges.items():
+            children.setdefault(p, []).append(c)
+        ready = children.get(-1, [])
+        while ready:
+            order += [(*edges[c], c) for c in ready]
+            ready = sorted([c for p in ready for c in children.get(p, ())], key=given.__getitem__)
+        looped = sorted(c for c in edges.keys() - {c for _, _, c in order} if _in_loop(c, edges))
+        if looped:
+            names = ", ".join(repr(s.bodies[c].name) for c in looped)
+            self.faults.append(f"bodies {names} hang on each other in a loop and not on the ground; "
+                               "join one of them to the ground and close the loop with close_loop")
         for k, body in enumerate(s.bodies):
             if k not in edges and k not in doubtful:
                 self.faults.append(f"body {shown(body.name)} has no joint; join it to a parent (a body that moves freely: Free)")
-        return sorted(order, key=lambda e: self.joints.index(e[0])) if _sorted_is_tree(order, self.joints) else order
+        places = {joint: k for k, joint in enumerate(self.joints)}
+        as_added = sorted(order, key=lambda e: places[e[0]])
+        return as_added if _is_tree(as_added) else order
 
     # -- loads, numbers, units
 
@@ -347,10 +347,10 @@ def _hashable(name: Any) -> Any:
     return name if isinstance(name, str) else shown(name)
 
 
-def _sorted_is_tree(order: list[tuple[Joint, int, int]], joints: list[Joint]) -> bool:
-    """Whether the order in which the joints were added already has parents before children."""
+def _is_tree(order: list[tuple[Joint, int, int]]) -> bool:
+    """Whether an order of joints has parents before children."""
     placed = {-1}
-    for _, parent, child in sorted(order, key=lambda e: joints.index(e[0])):
+    for _, parent, child in order:
         if parent not in placed:
             return False
         placed.add(child)

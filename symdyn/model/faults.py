@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.bodies import Body
-from symdyn.model.symbols import as_expression, finite
+from symdyn.model.symbols import as_expression, finite, flat
 from symdyn.model.sympy_vectors import components, is_dyadic, is_frame, is_point, is_sympy_vector, located
 from symdyn.shown import name_of, shown
 
@@ -49,7 +50,7 @@ class Faults(list[str]):
             self.append(f"{what} has {len(entries)} components; pass {' or '.join(map(str, sizes))}")
             entries = [0, 0, 0]
         row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
-        return sp.ImmutableMatrix(3, 1, row + [sp.S.Zero] * (3 - len(row)))
+        return _column(*row, *[sp.S.Zero] * (3 - len(row)))
 
     def point(self, value: Any, what: str, planar: bool = False, body: Any = None) -> sp.ImmutableMatrix:
         """A point of a body, from its origin in its axes: as `vector`, or a Point of SymPy's that is located from the origin.
@@ -140,7 +141,7 @@ class Faults(list[str]):
 
     def _entries(self, value: Any, what: str) -> list:
         if isinstance(value, sp.MatrixBase):
-            return list(value)
+            return list(flat(value))
         if isinstance(value, np.ma.MaskedArray):
             self.append(f"{what} is a masked array; pass a list of numbers or expressions")
             return [0, 0, 0]
@@ -152,6 +153,12 @@ class Faults(list[str]):
         if value and all(_is_row(row) for row in value) and all(len(row) == 1 for row in value):
             return [row[0] for row in value]
         return list(value)
+
+
+@lru_cache(maxsize=256)
+def _column(x: sp.Expr, y: sp.Expr, z: sp.Expr) -> sp.ImmutableMatrix:
+    """A vector; bodies that are alike have the same points and axes again and again, and SymPy takes long to make a matrix."""
+    return sp.ImmutableMatrix(3, 1, [x, y, z])
 
 
 def _is_row(value: Any) -> bool:

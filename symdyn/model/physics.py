@@ -12,6 +12,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.closures import Rod
 from symdyn.model.joints import Custom, Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
+from symdyn.model.symbols import flat
 from symdyn.shown import shown
 
 
@@ -28,7 +29,7 @@ def inertia_faults(body: Body, planar: bool) -> tuple[list[str], list[str]]:
         i, j = next((i, j) for i in range(3) for j in range(3) if difference[i, j] != 0)
         faults.append(f"{where}: inertia is not symmetric: I[{i + 1}, {j + 1}] = {I[i, j]}, "
                            f"I[{j + 1}, {i + 1}] = {I[j, i]}; pass a symmetric matrix")
-    elif all(e.is_number for e in I.flat()) and any(e != 0 for e in I.flat()):
+    elif all(e.is_number for e in flat(I)) and any(e != 0 for e in flat(I)):
         values = np.linalg.eigvalsh(np.array(I.tolist(), dtype=float))
         scale = np.abs(values).max()
         if values[0] < -1e-12 * scale:
@@ -51,7 +52,7 @@ def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
         where = f"joint {shown(joint.name)}"
         for what in ("parent_rotation", "child_rotation"):
             R = getattr(joint, what)
-            if any(abs(numeric(R[k])) > 1e-9 for k in (2, 5)):
+            if any(abs(numeric(flat(R)[k])) > 1e-9 for k in (2, 5)):
                 faults.append(f"{where}: {what} turns out of the x-y plane, but the system is planar; "
                                    "turn about z only, or make the system spatial: planar=False")
         if isinstance(joint, Custom):
@@ -61,7 +62,7 @@ def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
         elif not isinstance(joint, (Revolute, Prismatic, Planar, Fixed, Rod)):
             faults.append(f"{where} is {joint.kind}, but the system is planar; use Revolute, Prismatic, Planar or "
                                "Fixed, or make the system spatial: planar=False")
-        elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in joint.axis[:2]):
+        elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in flat(joint.axis)[:2]):
             faults.append(f"{where}: axis {list(joint.axis)} is not along z, but the system is planar; "
                                "pass [0, 0, 1] or [0, 0, -1], or make the system spatial: planar=False")
         elif isinstance(joint, Prismatic) and abs(numeric(joint.axis[2])) > 1e-9:

@@ -231,7 +231,8 @@ def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.Immutabl
 
 def quantities_in(expressions: Iterable[Any]) -> list[Quantity]:
     """The quantities in some expressions, each once, in the order of their names."""
-    found = {part for part in parts_of(*[e for e in expressions if isinstance(e, sp.Basic)]) if isinstance(part, Quantity)}
+    made_of = [e for e in expressions if isinstance(e, sp.Basic) and (e.args or isinstance(e, Quantity))]
+    found = {part for part in parts_of(*made_of) if isinstance(part, Quantity)}
     return sorted(found, key=lambda q: (q.name, str(q.measure)))
 
 

@@ -6,7 +6,7 @@ All are SymPy symbols, so that expressions print and differentiate as anywhere e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from inspect import getattr_static
 from typing import TYPE_CHECKING, Any
@@ -240,9 +240,16 @@ def motions(names: str, **assumptions: bool) -> Any:
     return _make(GivenMotion, names, assumptions)
 
 
+def flat(matrix: sp.MatrixBase) -> Sequence[Any]:
+    """The entries of a matrix, row by row; an immutable one holds them, and SymPy makes those of others from its own numbers."""
+    return matrix.args[2].args if isinstance(matrix, sp.ImmutableMatrix) else matrix.flat()
+
+
 def symbols_of(expression: Any) -> set[Any]:
     """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
-    entries = expression.flat() if isinstance(expression, sp.MatrixBase) else [expression]
+    if isinstance(expression, (sp.Symbol, sp.Number)):
+        return {expression} if isinstance(expression, sp.Symbol) else set()
+    entries = flat(expression) if isinstance(expression, sp.MatrixBase) else [expression]
     if all(isinstance(e, sp.Expr) for e in entries):
         parts = parts_of(*entries)
         if all(_free_of_its_own(kind) for kind in {type(part) for part in parts}):  # type: ignore[arg-type]
@@ -296,6 +303,8 @@ def as_expression(value: Any, what: str) -> sp.Expr:
 
 def _taken(value: Any, what: str) -> sp.Expr:
     """A number or expression; see `as_expression`."""
+    if isinstance(value, sp.Symbol):
+        return value
     if not isinstance(value, sp.Basic):
         if not isinstance(value, (int, float)) and not hasattr(value, "_sympy_") and not hasattr(value, "numerator"):
             raise ModelError([f"{what} is {shown(value)} of type {type(value).__name__}; "

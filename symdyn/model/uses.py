@@ -18,7 +18,7 @@ from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, To
 from symdyn.model.points import Point
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import joint_speeds
-from symdyn.model.symbols import Coordinate, GivenMotion, symbols_of, time
+from symdyn.model.symbols import Coordinate, GivenMotion, flat, symbols_of, time
 from symdyn.shown import shown
 from symdyn.turning import force_unit
 
@@ -49,7 +49,7 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
     s = system
     yield "gravity", s.gravity, Scope.PARAMETERS
     for body in s.bodies:
-        yield f"body {shown(body.name)}", [body.mass, *body.com.flat(), *body.inertia.flat()], Scope.PARAMETERS
+        yield f"body {shown(body.name)}", [body.mass, *flat(body.com), *flat(body.inertia)], Scope.PARAMETERS
     for gear in (g for g in s.loops if isinstance(g, Gear)):
         yield f"gear {shown(gear.name)}", [gear.ratio, gear.offset], Scope.PARAMETERS
     for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:
@@ -98,8 +98,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
     units: dict[sp.Symbol, str] = {time: "s"}
 
     def note(expressions: Iterable[sp.Expr], unit: str) -> None:
-        for e in expressions:
-            core = -e if e.could_extract_minus_sign() else e
+        for e in flat(expressions) if isinstance(expressions, sp.MatrixBase) else expressions:
+            core = e if isinstance(e, sp.Symbol) else -e if e.could_extract_minus_sign() else e
             if isinstance(core, sp.Symbol):
                 units.setdefault(core, unit)
 
@@ -119,11 +119,12 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         note(body.com, "m")
         note(body.inertia, "kg m^2")
     for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:
-        note([*joint.parent_point, *joint.child_point], "m")
+        note([*flat(joint.parent_point), *flat(joint.child_point)], "m")
         if isinstance(joint, Rod):
             note([joint.length], "m")
         if isinstance(joint, Helical):
             note([joint.pitch], "m/rad")
+    known: dict[Any, Joint] = {**{j.name: j for j in joints}, **{j: j for j in joints}}
     for load in loads:
         if isinstance(load, Force):
             note(load.force, "N")
@@ -131,7 +132,7 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         elif isinstance(load, Torque):
             note(load.torque, "N m")
         elif isinstance(load, JointForce):
-            driven = next((j for j in joints if load.joint in (j, j.name)), None)
+            driven = known.get(load.joint)
             for value, unit in zip(load.values, () if driven is None else driven.speed_units, strict=False):
                 if force_unit(unit):
                     note([value], force_unit(unit))

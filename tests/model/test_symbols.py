@@ -13,7 +13,7 @@ from sympy.physics.mechanics import dynamicsymbols, mlatex
 from sympy.physics.vector.printing import vlatex
 
 import symdyn as sd
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, as_coordinate, as_expression, take_over
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, as_coordinate, as_expression, flat, take_over
 from tests import helpers
 
 q1, q2, theta = sd.coordinates("q1 q2 theta")
@@ -32,6 +32,12 @@ def test_kinds_and_names() -> None:
     assert [s.name for s in (q1.dot, q1.ddot, q1.dot.dot, u.dot, t)] == ["q1_dot", "q1_ddot", "q1_ddot", "u1_dot", "t"]
     assert q1.dot.dot == q1.ddot and q1.dot == sd.coordinates("q1").dot and q1.dot != theta.dot
     assert type(sd.parameters("m")) is sp.Symbol and sd.parameters("m") == sp.Symbol("m")
+
+
+def test_entries_of_matrices_that_change_and_of_those_that_do_not() -> None:
+    rows = [[q1, 2, c], [sp.Rational(1, 3), q1 + c, 0.5]]
+    for made in (sp.Matrix, sp.ImmutableMatrix, sp.SparseMatrix, sp.ImmutableSparseMatrix):
+        assert list(flat(made(rows))) == [sp.sympify(e) for row in rows for e in row]
 
 
 def test_kinds_differ_though_names_agree() -> None:

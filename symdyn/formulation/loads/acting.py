@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.formulation.loads.recorded import Loads
 from symdyn.model.elements import AddedMass, Element, MooringLine
-from symdyn.model.joints import Prismatic, Revolute
+from symdyn.model.joints import Joint, Prismatic, Revolute
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
 from symdyn.model.record import Model
 from symdyn.shown import name_of
@@ -43,10 +43,11 @@ def acting(model: Model) -> tuple[Acting, ...]:
     of joints with several speeds, along which forces have no one point and direction."""
     contacts = [*(c.name for c in model.contacts if c.at), *(c.name for c in model.compliant)]
     own = {text for name in contacts for text in (f"contact {name}", f"contact {name}: moment")}
-    return tuple(one for load in model.loads if load.label not in own for one in _of_load(model, load) if one.body != _GROUND)
+    joints = {j.name: j for j in model.joints}
+    return tuple(one for load in model.loads if load.label not in own for one in _of_load(joints, load) if one.body != _GROUND)
 
 
-def _of_load(model: Model, load: Any) -> Iterator[Acting]:
+def _of_load(joints: Mapping[str, Joint], load: Any) -> Iterator[Acting]:
     if isinstance(load, Force):
         yield Acting(load, name_of(load.body), FORCE, load.point)
         if load.reaction is not None:
@@ -57,7 +58,7 @@ def _of_load(model: Model, load: Any) -> Iterator[Acting]:
         if load.reaction is not None:
             yield Acting(load, name_of(load.reaction), TORQUE)
     elif isinstance(load, JointForce):
-        joint = next((j for j in model.joints if j.name == name_of(load.joint)), None)
+        joint = joints.get(name_of(load.joint))
         if isinstance(joint, (Prismatic, Revolute)):
             kind = FORCE if isinstance(joint, Prismatic) else TORQUE
             yield Acting(load, name_of(joint.child), kind, joint)

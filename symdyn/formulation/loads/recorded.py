@@ -223,11 +223,9 @@ class Loads:
             result.add(other, zeros(3), -self._turn(n, pose.link, other.link))
 
     def _joint(self, result: Applied, load: JointForce) -> None:
-        joint = load.joint
-        for link in self.tree.links:
-            if link.joint is joint or link.joint.name == joint:
-                for place, value in zip(link.speeds, load.values, strict=True):
-                    result.joint[place] = result.joint[place] + self.value(value)
+        link = self.tree.moved_by.get(load.joint)
+        for place, value in zip(link.speeds, load.values, strict=True) if link is not None else ():
+            result.joint[place] = result.joint[place] + self.value(value)
 
     def _spring(self, result: Applied, load: SpringDamper, elastic: bool, damped: bool) -> None:
         springs = elastic if load.is_elastic(self.model.parameters) else damped  # with other loads, where it has no potential

@@ -224,8 +224,10 @@ class _Position:
         tape = Tape.of(Recorder(), **{str(k): array for k, array in enumerate(arrays)})
         for leaf in tape.inputs:
             name = leaf.args[1]
-            stream = random.Random(name) if name in self.parameters else self.stream
-            self.values.setdefault(name, stream.uniform(0.5, 1.5))
+            if name not in self.parameters:
+                self.values.setdefault(name, self.stream.uniform(0.5, 1.5))
+            elif name not in self.values:
+                self.values[name] = random.Random(name).uniform(0.5, 1.5)
         return list(evaluate(tape, self.values, DIGITS).values())
 
 

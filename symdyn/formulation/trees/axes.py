@@ -8,6 +8,8 @@ from typing import Any
 import sympy as sp
 
 from symdyn.model.joints import Joint
+from symdyn.model.joints.base import IDENTITY
+from symdyn.model.symbols import flat
 
 
 def along_coordinate_axis(joint: Joint) -> tuple[Joint, sp.ImmutableMatrix]:
@@ -17,8 +19,8 @@ def along_coordinate_axis(joint: Joint) -> tuple[Joint, sp.ImmutableMatrix]:
     has zeros that Rodrigues' formula about a general axis has not; A is constant and multiplied into constants.
     """
     axis = getattr(joint, "axis", None)
-    if axis is None or not all(e.is_number for e in axis) or sum(e != 0 for e in axis) == 1:
-        return joint, sp.ImmutableMatrix(sp.eye(3))
+    if axis is None or not all(e.is_number for e in flat(axis)) or sum(e != 0 for e in flat(axis)) == 1:
+        return joint, IDENTITY
     x, y, _ = axis
     across = sp.sqrt(x * x + y * y) if (x, y) != (0, 0) else sp.S.One
     first = sp.Matrix([-y, x, 0]) / across

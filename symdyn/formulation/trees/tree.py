@@ -134,6 +134,11 @@ class Tree:
         return tuple(map(tuple, found))
 
     @cached_property
+    def moved_by(self) -> Mapping[Joint | str, Link]:
+        """The link that each joint moves, by the joint and by its name."""
+        return {**{link.joint.name: link for link in self.links}, **{link.joint: link for link in self.links}}
+
+    @cached_property
     def idle(self) -> frozenset[str]:
         """Names of the parameters of the default 0."""
         return frozenset(p.name for p, value in self.model.defaults.items() if value == 0)
@@ -195,7 +200,7 @@ class _Part:
     effective: Inertia
     spin: tuple[int, Any] | None = None
 
-    @property
+    @cached_property
     def axis(self) -> int | None:
         """The coordinate axis that the joint turns about, if it does nothing else."""
         S = self.motion.S

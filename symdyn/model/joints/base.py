@@ -11,7 +11,7 @@ import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.faults import Faults
-from symdyn.model.symbols import Coordinate, as_coordinate, symbols_of
+from symdyn.model.symbols import Coordinate, as_coordinate, flat, symbols_of
 from symdyn.model.sympy_vectors import frames_of, is_sympy_vector
 from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import Vector
@@ -109,7 +109,7 @@ class Joint:
         """Expressions of parameters that describe the joint."""
         matrices = [self.parent_point, self.child_point, self.parent_rotation, self.child_rotation]
         matrices += [self.axis] if hasattr(self, "axis") else []
-        return [e for matrix in [*matrices, *getattr(self, "axes", [])] for e in matrix.flat()]
+        return [e for matrix in [*matrices, *getattr(self, "axes", [])] for e in flat(matrix)]
 
     def rates(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> list[Any]:
         """Derivatives of the coordinates from the speeds, q_dot = N(q) u."""
@@ -166,8 +166,11 @@ class Joint:
         axis = self._along(value, f"joint {shown(self.name)}: {what}")
         if len(self.faults) > before:
             return harmless
+        entries = flat(axis)
+        if all(e.is_Integer for e in entries) and sum(e * e for e in entries) == 1:
+            return axis
         length = numeric(sp.sqrt(axis.dot(axis)))
-        numbers = all(e.is_number for e in axis)
+        numbers = all(e.is_number for e in entries)
         if length < 1e-12 or (not numbers and abs(length - 1) > 1e-9):
             found = f"has length {length:.6g}" + ("" if numbers else " for arbitrary numbers")
             cure = "pass a direction that is not zero" if length < 1e-12 else "divide it by its length"
@@ -222,6 +225,8 @@ def _divided_by_its_length(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
 
 def numeric(expression: sp.Expr, symbols: Sequence[sp.Symbol] | None = None) -> float:
     """The value of an expression with its symbols (or more of them, in a given order), at fixed arbitrary numbers."""
+    if isinstance(expression, sp.Rational):
+        return float(expression)
     if symbols is None:
         symbols = sorted(symbols_of(expression), key=str)
     value = expression.xreplace({s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)})
