@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from symdyn.tape.node import Node
 from symdyn.tape.tape import unsigned
 
+_SUMS = ("add", "sub")
 Stretch = tuple[list[Node], list[Node]]
 
 
@@ -57,15 +57,23 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
 
 def products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
     """The steps with each product that only one sum needs just before that sum, so that both become one operation."""
-    uses = Counter(unsigned(a) for values in [*[n.args for n in body], entries] for a in values)
-    steps = set(body)
-    late = {unsigned(a) for node in body if node.op in ("add", "sub") for a in node.args
-            if uses[unsigned(a)] == 1 and unsigned(a) in steps and unsigned(a).op == "mul"}
+    alone: dict[Node, bool] = {}
+    for node in body:
+        summed = node.op in _SUMS
+        for a in node.args:
+            if isinstance(a, Node):
+                core = a.args[0] if a.op == "neg" else a
+                if core.op == "mul":
+                    alone[core] = summed and core not in alone
+    alone.update((core, False) for core in map(unsigned, entries) if isinstance(core, Node))
+    late = {node for node in body if node.op == "mul" and alone.get(node)}
     ordered: list[Node] = []
     for node in body:
-        if node not in late:
-            ordered += [unsigned(a) for a in node.args if unsigned(a) in late]
-            ordered.append(node)
+        if node in late:
+            continue
+        if node.op in _SUMS:
+            ordered += [core for core in map(unsigned, node.args) if core in late]
+        ordered.append(node)
     return ordered
 
 

@@ -70,9 +70,10 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                 be; where `like` is given, in those functions that it has loops in
     """
     otherwise, columns = otherwise or {}, columns or {}
-    whole = Tape(next(iter(tapes.values())).recorder,
-                 {name: next(iter(tape.outputs.values())) for name, tape in
-                  [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]})
+    first = next(iter(tapes.values()))
+    outputs = {name: next(iter(tape.outputs.values())) for name, tape in
+               [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]}
+    whole = first if first.outputs == outputs else Tape(first.recorder, outputs)
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
         [*reasons, *checks_of(whole, whole.steps).values()]))}
     late = _late(whole, tapes, otherwise)
@@ -129,6 +130,8 @@ def _prologue(writer: Writer, constants: Mapping[Node, int], rolls: Rolls, funct
 def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
     """Steps that depend on parameters only, and yet wait until a function runs: they divide by what may vanish, and then there
     is another way to compute the function."""
+    if not otherwise:
+        return set()
     either = [set(checks_of(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
     always = [set(checks_of(tape, tape.prologue)) for tape in
               [*[tape for name, tape in tapes.items() if name not in otherwise], *otherwise.values()]]
@@ -200,9 +203,12 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     """
     wanted = inlined.get(name)
     output = next(iter(tape.outputs.values()))
-    running = {*tape.running, *late}
-    taken = tape.steps if body is None else body
-    body = [n for n in taken if n in running and n not in hoisted and n.op != "leaf"]
+    if body is None and not late:
+        body = tape.running
+    else:
+        running = {*tape.running, *late}
+        taken = tape.steps if body is None else body
+        body = [n for n in taken if n in running and n not in hoisted and n.op != "leaf"]
     operations = count_of(body)
     checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in late), *dividing])
     repeats = rolls(name, len(body))

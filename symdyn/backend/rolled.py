@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from textwrap import fill
 from typing import Any
 
@@ -33,6 +34,7 @@ _ALONE = ("call", "item", "sines")
 _NUMBER, _STEP = "number", "step"
 # The arrays that these stand in; leaves and constants stand in those of their groups.
 _ARRAYS = {_STEP: "w", "sin": "w", "cos": "w"}
+_OTHERS = (_NUMBER, *_ARRAYS)
 # Records before the first and behind the last trip of a loop, for values of the bodies at the ends, which are computed apart.
 _SPARE = 2
 # Entries of a table that take as much time to compile as a statement.
@@ -129,7 +131,8 @@ class Rolled:
         self.read: list[Any] = list(self.steps)
         self.groups: list[str] = [_STEP] * len(self.steps)
         kinds = self._look()
-        begins = [k for k in range(1, len(self.steps)) if self.steps[k].section != self.steps[k - 1].section]
+        sections = [step.section for step in self.steps]
+        begins = [k + 1 for k, (one, other) in enumerate(pairwise(sections)) if one != other]
         self.loops = find_loops(kinds, begins)
         self.size = self._find_places()
 
@@ -170,40 +173,44 @@ class Rolled:
 
     def _look(self) -> np.ndarray:
         """Number what the steps read; returns the kinds of steps."""
+        steps, number, names = self.steps, self.number, self.tape.recorder.names
         order = {angle: k for k, angle in enumerate(self.angles)}
         n = len(self.angles)
         sines = {node: (1 + (node.op == "cos")) * n + order[node.args[0]] for node in self.at_once}
-        place = [-1] * len(self.steps)
-        kinds: dict[tuple[Any, ...], int] = {}
-        found = np.empty(len(self.steps), dtype=np.int64)
-        references = []
-        names = self.tape.recorder.names
-        for k, step in enumerate(self.steps):
-            signature: list[Any] = [step.op, *((step in self.checks, step in names) if isinstance(step, Node) else ())]
-            row = [-1, -1, -1]
-            alone = step.op in _ALONE
-            for j, a in enumerate(step.args):
-                core = unsigned(a)
-                if alone and not isinstance(core, Node):
-                    continue
-                key = core if isinstance(core, Node) else (type(core), core)
-                number = self.number.get(key)
-                if number is None:
-                    number = self.number[key] = len(self.read)
-                    group, at = self._group(core, sines)
-                    self.read.append(core)
-                    self.groups.append(group)
-                    place.append(at)
-                if not alone:
-                    row[j] = number
-                    signature += (core is not a, self.groups[number])
-            if alone:
-                signature.append(k)
-            references.append(row)
-            found[k] = kinds.setdefault(tuple(signature), len(kinds))
-        self.references = np.array(references, dtype=np.int64).reshape(-1, 3)
+        place = [-1] * len(steps)
+        values = [a for step in steps for a in step.args]
+        minus = np.array([isinstance(a, Node) and a.op == "neg" for a in values], dtype=np.int64)
+        cores = [a.args[0] if isinstance(a, Node) and a.op == "neg" else a for a in values]
+        sizes = np.array([len(step.args) for step in steps], dtype=np.int64)
+        reader = np.repeat(np.arange(len(steps)), sizes)
+        alone = np.array([step.op in _ALONE for step in steps], dtype=bool)
+        read = np.array([number.get(core, -1) if isinstance(core, Node) else -1 for core in cores], dtype=np.int64)
+        for k in np.flatnonzero(read < 0).tolist():
+            core = cores[k]
+            if not isinstance(core, Node) and alone[reader[k]]:
+                continue
+            key = core if isinstance(core, Node) else (type(core), core)
+            if key not in number:
+                number[key] = len(self.read)
+                group, at = self._group(core, sines)
+                self.read.append(core)
+                self.groups.append(group)
+                place.append(at)
+            read[k] = number[key]
         self.place = np.array(place, dtype=np.int64)
-        return found
+
+        together = ~alone[reader]
+        where = reader[together], (np.arange(len(values)) - np.repeat(np.cumsum(sizes) - sizes, sizes))[together]
+        self.references = np.full((len(steps), 3), -1, dtype=np.int64)
+        self.references[where] = read[together]
+        kinds = _numbered([step.op for step in steps])
+        kinds = 4 * kinds + np.array([2 * (step in self.checks) + (step in names) for step in steps], dtype=np.int64)
+        taken = np.zeros((len(steps), 3), dtype=np.int64)
+        taken[where] = 1 + (2 * _numbered(self.groups)[read] + minus)[together]
+        for column in taken.T:
+            kinds = kinds * (1 + 2 * (len(ARGUMENTS) + len(_OTHERS))) + column
+        kinds[alone] = -1 - np.flatnonzero(alone)
+        return kinds
 
     def _group(self, core: Any, sines: Mapping[Node, int]) -> tuple[str, int]:
         """The array that a value is read from, if it is not a step, and its place there."""
@@ -526,6 +533,12 @@ class _LoopWriter:
         written = fill(", ".join(values), 116, subsequent_indent="    ", break_long_words=False)
         self.before.insert(0, form.format(name=name, values=written))
         return self.words.item.format(name=name)
+
+
+def _numbered(values: Sequence[str]) -> np.ndarray:
+    """Numbers in place of texts."""
+    numbers: dict[str, int] = {}
+    return np.array([numbers.setdefault(value, len(numbers)) for value in values], dtype=np.int64)
 
 
 def _in_words(first: str, second: str, index: str) -> str:

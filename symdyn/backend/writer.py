@@ -245,11 +245,14 @@ def taken_at_once(body: Sequence[Node], dialect: Dialect) -> list[Node]:
     chosen: list[Node] = []
     waiting: set[Node] = set()
     for node in body:
-        if not waiting.isdisjoint(cores_of(node.args)):
-            waiting.add(node)
-        elif node.op in ("sin", "cos"):
-            chosen.append(node)
-            waiting.add(node)
+        for a in node.args:
+            if isinstance(a, Node) and (a.args[0] if a.op == "neg" else a) in waiting:
+                waiting.add(node)
+                break
+        else:
+            if node.op in ("sin", "cos"):
+                chosen.append(node)
+                waiting.add(node)
     return chosen if dialect.sincos is not None and len(chosen) >= dialect.sincos.least else []
 
 
@@ -262,4 +265,4 @@ def checks_of(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
 
 def cores_of(values: Sequence[Any]) -> list[Node]:
     """The nodes among values, without their signs; a sign of a difference is written by exchanging its sides."""
-    return [core for core in map(unsigned, values) if isinstance(core, Node)]
+    return [value.args[0] if value.op == "neg" else value for value in values if isinstance(value, Node)]
