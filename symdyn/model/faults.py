@@ -50,7 +50,7 @@ class Faults(list[str]):
             self.append(f"{what} has {len(entries)} components; pass {' or '.join(map(str, sizes))}")
             entries = [0, 0, 0]
         row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
-        return _column(*row, *[sp.S.Zero] * (3 - len(row)))
+        return matrix_of(3, 1, *row, *[sp.S.Zero] * (3 - len(row)))
 
     def point(self, value: Any, what: str, planar: bool = False, body: Any = None) -> sp.ImmutableMatrix:
         """A point of a body, from its origin in its axes: as `vector`, or a Point of SymPy's that is located from the origin.
@@ -93,7 +93,8 @@ class Faults(list[str]):
         if len(entries) != 3 or any(not _is_row(row) or len(row) != 3 for row in entries):
             self.append(f"{what} is not a 3 x 3 matrix; pass three rows of three, or the three diagonal entries")
             return sp.ImmutableMatrix(sp.zeros(3, 3))
-        return sp.ImmutableMatrix(3, 3, lambda i, j: self.expression(entries[i][j], f"{what}[{i + 1}, {j + 1}]"))
+        return matrix_of(3, 3, *[self.expression(e, f"{what}[{i + 1}, {j + 1}]")
+                                 for i, row in enumerate(entries) for j, e in enumerate(row)])
 
     def numbers(self, values: Any, known: Sequence[sp.Symbol], what: str, kind: str,
                 meant: Callable[[sp.Basic], sp.Basic]) -> dict[sp.Symbol, float]:
@@ -127,7 +128,8 @@ class Faults(list[str]):
             if not any(_is_row(e) for e in rows):
                 rows = [[e if i == k else 0 for k in range(n)] for i, e in enumerate(rows)]
             if all(_is_row(row) and len(row) == n for row in rows):
-                return sp.ImmutableMatrix(n, n, lambda i, j: self.expression(rows[i][j], f"{what}[{i + 1}, {j + 1}]"))
+                return sp.ImmutableMatrix(n, n, [self.expression(e, f"{what}[{i + 1}, {j + 1}]")
+                                                 for i, row in enumerate(rows) for j, e in enumerate(row)])
         self.append(f"{what} is not a {n} x {n} matrix; pass {n} rows of {n}, or the {n} diagonal entries")
         return sp.ImmutableMatrix(sp.zeros(n, n))
 
@@ -156,9 +158,9 @@ class Faults(list[str]):
 
 
 @lru_cache(maxsize=256)
-def _column(x: sp.Expr, y: sp.Expr, z: sp.Expr) -> sp.ImmutableMatrix:
-    """A vector; bodies that are alike have the same points and axes again and again, and SymPy takes long to make a matrix."""
-    return sp.ImmutableMatrix(3, 1, [x, y, z])
+def matrix_of(rows: int, columns: int, *entries: sp.Expr) -> sp.ImmutableMatrix:
+    """A matrix; bodies that are alike have the same ones again and again, and SymPy takes long to make one."""
+    return sp.ImmutableMatrix(rows, columns, entries)
 
 
 def _is_row(value: Any) -> bool:

@@ -305,6 +305,8 @@ def _taken(value: Any, what: str) -> sp.Expr:
     """A number or expression; see `as_expression`."""
     if isinstance(value, sp.Symbol):
         return value
+    if type(value) is int and abs(value) < 2**53:
+        return sp.Integer(value)
     if not isinstance(value, sp.Basic):
         if not isinstance(value, (int, float)) and not hasattr(value, "_sympy_") and not hasattr(value, "numerator"):
             raise ModelError([f"{what} is {shown(value)} of type {type(value).__name__}; "

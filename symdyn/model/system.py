@@ -21,7 +21,7 @@ from symdyn.model.contacts.joints import JointElement
 from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import Event, make_event
-from symdyn.model.faults import Faults
+from symdyn.model.faults import Faults, matrix_of
 from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
@@ -156,7 +156,7 @@ class System(SystemFacade):
         if inertia is None:
             matrix = sp.ImmutableMatrix(sp.zeros(3, 3))
         elif self.planar and not hasattr(inertia, "__len__") and not is_dyadic(inertia):
-            matrix = sp.ImmutableMatrix(sp.diag(0, 0, faults.expression(inertia, f"{where}: inertia")))
+            matrix = matrix_of(3, 3, *[sp.S.Zero] * 8, faults.expression(inertia, f"{where}: inertia"))
         else:
             matrix = faults.matrix(inertia, f"{where}: inertia", frame)
         if is_point(com):

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion, numeric, turn
+from symdyn.model.symbols import flat
 from symdyn.shown import shown
-from symdyn.spatial.vectors import cross, zeros
+from symdyn.spatial.vectors import cross, dot, zeros
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -42,7 +43,7 @@ class Universal(Joint):
             self.faults.append(f"joint {shown(name)} (universal) takes 2 axes, found {shown(axes)}")
             axes = ((1, 0, 0), (0, 1, 0))
         first, second = self.axes = (self._axis(axes[0], "first axis"), self._axis(axes[1], "second axis"))
-        if not self.faults and abs(abs(numeric(first.dot(second))) - 1) < 1e-9:
+        if not self.faults and abs(abs(numeric(dot(flat(first), flat(second)))) - 1) < 1e-9:
             self.faults.append(f"joint {shown(name)} (universal): its two axes are parallel; pass axes at an angle, or use "
                                "Revolute")
 
