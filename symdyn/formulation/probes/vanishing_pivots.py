@@ -24,6 +24,7 @@ from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import cross, inner
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import is_zero
+from symdyn.tape.quick import evaluate_quickly
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape
 
@@ -186,7 +187,7 @@ class _Position:
         if k not in self._twists:
             link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
             own = sorted(frozenset().union(*self.own[k]))
-            R, r, S, D = map(_floats, self.numbers(link.R, link.r, link.S, D[:, own]))
+            R, r, S, D = self.floats(link.R, link.r, link.S, D[:, own])
             found = dict(zip(own, (S @ D).T, strict=True))
             before = self.twists(link.parent) if link.parent >= 0 else {}
             for c in self.alive & before.keys():
@@ -221,6 +222,15 @@ class _Position:
 
     def numbers(self, *arrays: np.ndarray) -> list[np.ndarray]:
         """Arrays of nodes in numbers of 40 digits; parameters of the default 0 are 0."""
+        return list(evaluate(self._tape(arrays), self.values, DIGITS).values())
+
+    def floats(self, *arrays: np.ndarray) -> list[np.ndarray]:
+        """The same, rounded to doubles; NaN for what is no real number."""
+        found = evaluate_quickly(self._tape(arrays), self.values, DIGITS)
+        return [array.astype(float) for array in found.values()]
+
+    def _tape(self, arrays: Sequence[np.ndarray]) -> Tape:
+        """A tape of arrays; its leaves get values."""
         tape = Tape.of(Recorder(), **{str(k): array for k, array in enumerate(arrays)})
         for leaf in tape.inputs:
             name = leaf.args[1]
@@ -228,7 +238,7 @@ class _Position:
                 self.values.setdefault(name, self.stream.uniform(0.5, 1.5))
             elif name not in self.values:
                 self.values[name] = random.Random(name).uniform(0.5, 1.5)
-        return list(evaluate(tape, self.values, DIGITS).values())
+        return tape
 
 
 def _floats(values: np.ndarray) -> np.ndarray:
