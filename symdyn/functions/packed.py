@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -12,11 +13,18 @@ from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape, reachable
 
+# What was found of equations that are still in use: whether there is the function, its text and its reader each take it.
+_found: WeakKeyDictionary[Equations, Places | None] = WeakKeyDictionary()
+
 
 def places(equations: Equations) -> Places | None:
     """Where x_dot depends on x, by the statements; None where a numeric algorithm solves for some of it, at some states."""
-    if equations.otherwise is not None:
-        return None
+    if equations not in _found:
+        _found[equations] = None if equations.otherwise is not None else _looked_for(equations)
+    return _found[equations]
+
+
+def _looked_for(equations: Equations) -> Places | None:
     entries = equations.quantity("rhs").tolist()
     bits = {node: 1 << k for k, node in enumerate(_leaves(equations)) if node is not None}
     for node in reachable(entries):
