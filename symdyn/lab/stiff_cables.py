@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
@@ -35,6 +35,8 @@ BOUND = 1e-6
 # Dense factors are measured up to so many links.
 LARGEST_DENSE = 100
 RTOL, DURATION = 1e-6, 0.1
+# Newton's iteration to a shape at rest: it has ended where a step is no longer than this, m, and takes so many steps at most.
+SETTLED, NEWTON_STEPS = 1e-14, 30
 HEADING = (f"{'links':>6}{'states':>8}{'entries':>9}{'derive s':>10}{'method':>9}{'steps':>8}{'Jacobians':>11}{'factors':>9}"
            f"{'s a second':>12}{'error':>10}")
 
@@ -128,7 +130,10 @@ def measure(n: int) -> list[Row]:
 
 def at_rest(module: Module) -> tuple[np.ndarray, csc_matrix]:
     """The coordinates of a cable at rest, by Newton's iteration from where it starts, and the derivative of its accelerations by
-    them there, a sparse matrix."""
+    them there, a sparse matrix.
+
+    Raises NoEquilibrium where the iteration does not end, or where nothing holds the cable on its way.
+    """
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
@@ -136,15 +141,21 @@ def at_rest(module: Module) -> tuple[np.ndarray, csc_matrix]:
     assert places is not None
     own = (places.rows >= n) & (places.columns < n)
     q = np.array([module.metadata.initial.get(name, 0.0) for name in module.metadata.q])
-    for _ in range(30):
+    for k in range(NEWTON_STEPS):
         state = np.concatenate([q, np.zeros(n)])
         values = module.evaluate("jacobian_x_packed", 0.0, state)
         slope = csc_matrix((values[own], (places.rows[own] - n, places.columns[own])), shape=(n, n))
-        step = splu(slope).solve(-module.rhs(0.0, state)[n:])
+        try:
+            step = splu(slope).solve(-module.rhs(0.0, state)[n:])
+        except RuntimeError:  # an exactly singular matrix
+            raise NoEquilibrium(f"{module.metadata.name}: the shape at rest is looked for by Newton's iteration; at its step "
+                                f"{k + 1} the stiffness of the {n} coordinates is singular; take a tension above 0") from None
         q = q + step
-        if np.abs(step).max() <= 1e-14:
-            break
-    return q, slope
+        if np.abs(step).max() <= SETTLED:
+            return q, slope
+    raise NoEquilibrium(f"{module.metadata.name}: the shape at rest is looked for by Newton's iteration; after {NEWTON_STEPS} "
+                        f"steps the last one is {np.abs(step).max():.1e} m long, more than {SETTLED:g} m; take more tension, so "
+                        "that the cable sags less")
 
 
 def frequencies(slope: csc_matrix, count: int = 5) -> np.ndarray:

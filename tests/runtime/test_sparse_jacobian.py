@@ -10,7 +10,8 @@ from scipy.sparse import issparse
 
 import symdyn as sd
 from symdyn.cli import main
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.functions import packed
 from symdyn.lab import stiff_cables
 from symdyn.lab.stiff_cables import at_rest, elastic_cable, elastic_catenary, frequencies, irvine
 from symdyn.runtime.building.compiler import find_compiler
@@ -121,6 +122,24 @@ def test_sag_and_frequencies_converge_to_closed_forms() -> None:
     links = 2 * 40 * np.sin(np.arange(2, 6) * np.pi / 80) * np.sqrt(H)
     assert found[1][1::2] == pytest.approx(links[::2], rel=1e-6)
     assert (4 * found[1] - found[0]) / 3 == pytest.approx(exact, rel=1e-4)
+
+
+def test_shapes_that_are_not_found_raise(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(NoEquilibrium, match=r"^elastic_cable_12: .* step 1 the stiffness of the 22 coordinates is singular"):
+        at_rest(elastic_cable(12, tension=0.0).embedding().compile(backend="numpy"))
+    monkeypatch.setattr(stiff_cables, "NEWTON_STEPS", 2)
+    with pytest.raises(NoEquilibrium, match=r"after 2 steps the last one is \d\.\de-0\d m long, more than 1e-14 m"):
+        at_rest(cable)
+
+
+def test_where_entries_stand_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked, look = [], packed._looked_for
+    monkeypatch.setattr(packed, "_looked_for", lambda equations: looked.append(equations) or look(equations))
+    module = sd.systems.get("double_pendulum").embedding().compile(backend="numpy")
+    matrix(module, np.array([0.1, 0.2, 0.3, 0.4]))
+    assert len(looked) == 1
+    another = sd.systems.get("double_pendulum").embedding()
+    assert packed.places(another) is packed.places(another) and len(looked) == 2
 
 
 @needs_c
