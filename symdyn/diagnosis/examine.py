@@ -14,7 +14,7 @@ from symdyn.diagnosis.mobility import Mobility, mobility
 from symdyn.diagnosis.paths import LOST, NEAR, STEP, Near, Scaled, follow
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState
 from symdyn.errors import ArgumentError, ModelError, SymdynError
-from symdyn.formulation.constraints.consistent_states import ConstraintStates
+from symdyn.formulation.constraints.consistent_states import AtStates, ConstraintStates
 from symdyn.formulation.probes.dependent_rows import ranks
 from symdyn.model.loop_check import CARRIER
 from symdyn.runtime.consistent import number
@@ -191,11 +191,11 @@ class _Examination:
         """Consistent states: here, then random ones around, (s, n_q)."""
         stream = np.random.default_rng(1)
         found = self.states.at(here[None])
-        n_u = found["N"].shape[2]
+        n_u = found.N.n
         states = [here[None]]
         for _ in range(4):
-            repeated = {name: np.repeat(array, 2 * STATES, axis=0) for name, array in found.items()}
-            moved = here + self.states.moved(repeated, SPREAD * stream.uniform(-1, 1, (2 * STATES, n_u)))
+            along = SPREAD * stream.uniform(-1, 1, (2 * STATES, n_u))
+            moved = here + self.states.moved(found[np.zeros(2 * STATES, dtype=int)], along)
             q, residual = self.states.nearest(moved)
             states.append(q[residual <= FULFILLED])
             if sum(map(len, states)) > STATES:
@@ -204,10 +204,10 @@ class _Examination:
         others = others[np.abs(others - here).max(axis=1, initial=0.0) > APART]
         return np.concatenate([here[None], others])[:STATES + 1]
 
-    def _scaled(self, found: Mapping[str, np.ndarray]) -> tuple[Scaled, list[int]]:
+    def _scaled(self, found: AtStates) -> tuple[Scaled, list[int]]:
         """Scales that hold for all states, and the places of those with the largest rank."""
-        rows = np.median(found["C_scale"][1:] if len(found["C_scale"]) > 1 else found["C_scale"], axis=0)
-        raw = Scaled(self.states, rows, 1.0, 0).of(dict(found))
+        rows = np.median(found.C_scale[1:] if len(found.C_scale) > 1 else found.C_scale, axis=0)
+        raw = Scaled(self.states, rows, 1.0, 0).of(found)
         sizes = np.linalg.svd(raw, compute_uv=False)
         size = float(np.median(sizes[:, 0])) if sizes.size else 1.0
         ranks = (sizes > RANK * max(size, 1e-300)).sum(axis=1)
@@ -335,8 +335,8 @@ class _Examination:
         found = self.states.at(here[None])
         residual = self.states.residual(found)[0]
         order = [int(k) for k in np.argsort(-np.abs(residual)) if not abs(residual[k]) <= FULFILLED]
-        if np.isfinite(found["C_r"]).all() and self.names:
-            A = Scaled(self.states, found["C_scale"][0], 1.0, 0).of(dict(found))
+        if np.isfinite(found.C_r.values).all() and self.names:
+            A = Scaled(self.states, found.C_scale[0], 1.0, 0).of(found)
             rank = _rank(A / max(np.linalg.norm(A[0], 2), 1e-300))
             A = A[0]
             if rank < len(A):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symdyn.formulation.constraints.consistent_states import FULFILLED, ConstraintStates
+from symdyn.formulation.constraints.consistent_states import FULFILLED, AtStates, ConstraintStates
 
 STEP = 0.05
 # Motions that are followed, each both ways.
@@ -25,14 +25,14 @@ class Scaled:
     size: float
     rank: int
 
-    def at(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    def at(self, q: np.ndarray) -> tuple[np.ndarray, AtStates]:
         """(s, n_c, n_u), and what it was made from."""
         found = self.states.at(q)
         return self.of(found), found
 
-    def of(self, found: dict[str, np.ndarray]) -> np.ndarray:
-        D = np.where(self.states.angular[None, None, :], found["length"][:, None, None], 1.0)
-        scaled: np.ndarray = found["C_r"] * self.rows[None, :, None] / D / self.size
+    def of(self, found: AtStates) -> np.ndarray:
+        D = np.where(self.states.angular[None, None, :], found.length[:, None, None], 1.0)
+        scaled: np.ndarray = found.C_r.dense() * self.rows[None, :, None] / D / self.size
         return scaled
 
     def smallest(self, q: np.ndarray) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,27 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
     values   leaf name -> a number, or an array (n,); what is not defined at a point (log of a negative number) is NaN there
     Raises KeyError naming the inputs that have no value.
     """
+    return {name: entries.dense() for name, entries in evaluate_entries(tape, values, n).items()}
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Of an output of a tape the entries that are not zero by structure: places (e,) in it, ascending, row by row, and values
+    (n, e) at n points."""
+
+    shape: tuple[int, ...]
+    places: np.ndarray
+    values: np.ndarray
+
+    def dense(self) -> np.ndarray:
+        """(n, ...)"""
+        flat = np.zeros((len(self.values), math.prod(self.shape)))
+        flat[:, self.places] = self.values
+        return flat.reshape((len(flat), *self.shape))
+
+
+def evaluate_entries(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, Entries]:
+    """The same as `evaluate_rows`, without the entries that are zero by structure."""
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
     if missing:
         raise KeyError(f"no value for {', '.join(missing)}")
@@ -26,10 +49,14 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
         done = walk(tape.steps, Arrays(values))
     result = {}
     for name, output in tape.outputs.items():
-        flat = np.tile(output.numbers, (n, 1))
-        for k, node in output.nodes:
-            flat[:, k] = done[node]
-        result[name] = flat.reshape((n, *output.shape))
+        numbers = output.numbers
+        there = numbers != 0
+        there[[k for k, _ in output.nodes]] = True
+        places = np.flatnonzero(there)
+        entries = np.tile(numbers[places], (n, 1))
+        for column, (_, node) in zip(np.searchsorted(places, [k for k, _ in output.nodes]), output.nodes, strict=True):
+            entries[:, column] = done[node]
+        result[name] = Entries(output.shape, places, entries)
     return result
 
 

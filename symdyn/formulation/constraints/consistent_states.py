@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
-from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.floats import evaluate_entries
 from symdyn.turning import turns
 
 ITERATIONS = 60
@@ -16,6 +18,20 @@ ITERATIONS = 60
 FULFILLED = 1e-12
 # Singular values below this part of the largest are left out of a step.
 CUT = 1e-10
+
+
+@dataclass(frozen=True)
+class AtStates:
+    """C (s, n_c), C_scale (s, n_c), length (s,), C_r (s, n_c, n_u), N (s, n_q, n_u) at s states."""
+
+    C: np.ndarray
+    C_scale: np.ndarray
+    length: np.ndarray
+    C_r: Sampled
+    N: Sampled
+
+    def __getitem__(self, states: np.ndarray) -> AtStates:
+        return AtStates(*[getattr(self, f.name)[states] for f in fields(self)])
 
 
 class ConstraintStates:
@@ -31,9 +47,11 @@ class ConstraintStates:
         self.units = [[self.names.index(q.name) for q in group] for group in equations.unit_groups]
         self.angular = np.array([turns(symbols.units.get(u)) for u in symbols.speeds], dtype=bool)
 
-    def at(self, q: np.ndarray) -> dict[str, np.ndarray]:
-        """C (s, n_c), C_r (s, n_c, n_u), C_scale (s, n_c), N (s, n_q, n_u), length (s,) at coordinates (s, n_q)."""
-        return evaluate_rows(self.tape, {**self.values, **dict(zip(self.names, q.T, strict=True))}, len(q))
+    def at(self, q: np.ndarray) -> AtStates:
+        """What there is at coordinates (s, n_q)."""
+        entries = evaluate_entries(self.tape, {**self.values, **dict(zip(self.names, q.T, strict=True))}, len(q))
+        return AtStates(*[entries[name].dense() for name in ("C", "C_scale", "length")],
+                        *[Sampled.of_entries(entries[name]) for name in ("C_r", "N")])
 
     def nearest(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """From coordinates (s, n_q) the consistent ones nearby by Gauss-Newton, and the largest residual left, relative, (s,).
@@ -46,38 +64,36 @@ class ConstraintStates:
             found = self.at(now[running])
             residual = self.residual(found)
             size = np.abs(residual).max(axis=1, initial=0.0)
-            defined = np.isfinite(size) & np.isfinite(found["C_r"]).all(axis=(1, 2))
+            defined = np.isfinite(size) & np.isfinite(found.C_r.values).all(axis=1)
             better = defined & (size < least[running])
             best[running[better]], least[running[better]] = now[running[better]], size[better]
             on = defined & (size >= FULFILLED)
             if k == ITERATIONS or not on.any():
                 break
             running = running[on]
-            found = {name: array[on] for name, array in found.items()}
-            now[running] += self._step(found, residual[on])
+            now[running] += self._step(found[on], residual[on])
             self._normalise(now)
         return best, least
 
-    def residual(self, found: Mapping[str, np.ndarray]) -> np.ndarray:
+    def residual(self, found: AtStates) -> np.ndarray:
         """C C_scale / length, (s, n_c)."""
-        return found["C"] * found["C_scale"] / found["length"][:, None]
+        return found.C * found.C_scale / found.length[:, None]
 
     def velocities(self, length: Any) -> np.ndarray:
         """What makes velocities (m/s) of the speeds, (n_u,)."""
         return np.where(self.angular, length, 1.0)
 
-    def moved(self, found: Mapping[str, np.ndarray], y: np.ndarray) -> np.ndarray:
+    def moved(self, found: AtStates, y: np.ndarray) -> np.ndarray:
         """Changes of the coordinates (s, n_q) for directions y (s, n_u) of the speeds as parts of the length."""
-        length = found["length"][:, None]
-        v = y * length / np.where(self.angular[None, :], length, 1.0)
-        changes: np.ndarray = (found["N"] @ v[..., None])[..., 0]
-        return changes
+        length = found.length[:, None]
+        return found.N.times(y * length / np.where(self.angular[None, :], length, 1.0))
 
-    def _step(self, found: Mapping[str, np.ndarray], residual: np.ndarray) -> np.ndarray:
-        length = found["length"][:, None, None]
-        A = found["C_r"] * found["C_scale"][..., None] / np.where(self.angular[None, None, :], length, 1.0)
-        A[:, ~self.holonomic] = 0.0
-        y = -(np.linalg.pinv(A, rcond=CUT) @ residual[..., None])[..., 0]
+    def scaled(self, found: AtStates) -> Sampled:
+        """C_r, lengths by lengths."""
+        return found.C_r.scaled(found.C_scale, np.where(self.angular[None, :], found.length[:, None], 1.0))
+
+    def _step(self, found: AtStates, residual: np.ndarray) -> np.ndarray:
+        y = -self.scaled(found).without_rows(~self.holonomic).least_change(residual, CUT)
         largest = np.abs(y).max(axis=1, initial=0.0)[:, None]
         return self.moved(found, y / np.maximum(largest, 1.0))  # at most about a radian at once
 

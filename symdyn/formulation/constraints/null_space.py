@@ -169,25 +169,32 @@ def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[i
 
     sample (m, n): C at a state, scaled; structure (m, n): where C is not zero by structure
     """
-    A, filled = sample.astype(float).copy(), structure.copy()
-    waiting, free = np.ones(len(A), dtype=bool), np.ones(A.shape[1], dtype=bool)
+    A, left = sample.astype(float).copy(), structure.copy()  # left: of waiting rows and free columns
+    waiting = np.ones(len(A), dtype=bool)
+    largest = np.where(left, np.abs(A), 0.0).max(axis=1, initial=0.0)
+    in_rows, in_columns = left.sum(axis=1), left.sum(axis=0)
     pivots: list[tuple[int, int]] = []
     for _ in range(len(A)):
-        open_entries = filled & waiting[:, None] & free
-        size = np.where(waiting[:, None] & free, np.abs(A), 0.0)
-        largest = size.max(axis=1, initial=0.0)
-        admitted = open_entries & (size >= ADMITTED * largest[:, None]) & (largest > 1e-9)[:, None]
-        if not admitted.any():
+        rows, columns = np.divmod(np.flatnonzero(left), A.shape[1])
+        size = np.abs(A[rows, columns])
+        admitted = np.flatnonzero((size >= ADMITTED * largest[rows]) & (largest[rows] > 1e-9))
+        if not len(admitted):
             return None
-        fill = np.outer(open_entries.sum(axis=1) - 1, open_entries.sum(axis=0) - 1)
-        least = admitted & (fill == fill[admitted].min())
-        i, j = (int(k) for k in np.unravel_index(np.argmax(np.where(least, size, -1.0)), A.shape))
+        fill = (in_rows[rows[admitted]] - 1) * (in_columns[columns[admitted]] - 1)
+        least = admitted[fill == fill.min()]
+        place = least[np.argmax(size[least])]
+        i, j = int(rows[place]), int(columns[place])
         pivots.append((i, j))
-        waiting[i] = free[j] = False
-        below = np.flatnonzero(waiting & (A[:, j] != 0))
-        A[below] -= np.outer(A[below, j] / A[i, j], A[i])
-        filled[waiting & filled[:, j]] |= filled[i]
-        A[waiting, j] = 0.0
+        waiting[i] = False
+        row, below = np.flatnonzero(left[i]), np.flatnonzero(waiting & left[:, j])
+        left[i] = left[:, j] = False
+        row = row[row != j]
+        others = np.ix_(below, row)
+        A[others] -= np.outer(A[below, j] / A[i, j], A[i, row])
+        in_columns[row] += (~left[others]).sum(axis=0) - 1
+        in_rows[below] += (~left[others]).sum(axis=1) - 1
+        left[others] = True
+        largest[below] = np.where(left[below], np.abs(A[below]), 0.0).max(axis=1, initial=0.0)
     return pivots
 
 

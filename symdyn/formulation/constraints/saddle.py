@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from symdyn.formulation.constraints.sampled import minimum_degree
 from symdyn.formulation.trees.mass_matrix import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
@@ -45,10 +46,7 @@ class RangeSolver:
             self.Y = np.array([factors.inwards(row) for row in C], dtype=object).reshape(-1, n).T
             self.Z = np.array([[0 if is_zero(e) else e * d for e in row]
                                for row, d in zip(self.Y, factors.inverse_D, strict=True)], dtype=object).reshape(self.Y.shape)
-            S = zeros(len(C), len(C))
-            for i in range(len(C)):
-                for j in range(i + 1):
-                    S[i, j] = S[j, i] = inner(self.Y[:, i], self.Z[:, j])
+            S = _square(self.Y, self.Z)
             algebra.name("S", S)
             order = fewest_neighbours(S)
             self.order = order
@@ -66,6 +64,20 @@ class RangeSolver:
         lam = zeros(len(d))
         lam[self.order] = found
         return self.factors.outwards(inwards - (self.Y @ lam if len(lam) else zeros(len(f)))), lam
+
+
+def _square(Y: np.ndarray, Z: np.ndarray) -> np.ndarray:
+    """Y^T Z, (m, m), which is symmetric, of matrices (n, m) with zeros in the same places, by columns that meet in some row."""
+    m = Y.shape[1]
+    S = zeros(m, m)
+    for k, row in enumerate(Y):
+        there = [j for j, e in enumerate(row) if not is_zero(e)]
+        for place, i in enumerate(there):
+            for j in there[:place + 1]:
+                S[i, j] = S[i, j] + Y[k, i] * Z[k, j]
+    for i in range(m):
+        S[:i, i] = S[i, :i]
+    return S
 
 
 class KernelSolver:
@@ -137,18 +149,6 @@ def narrow_order(M: np.ndarray, C: np.ndarray) -> list[int]:
 
 
 def fewest_neighbours(S: np.ndarray) -> list[int]:
-    """An order of the rows of a symmetric matrix in which eliminating from the last row to the first fills in little.
-
-    Minimum degree; Duff, Erisman and Reid, Direct Methods for Sparse Matrices, section 7.2.
-    """
+    """An order of the rows of a symmetric matrix in which eliminating from the last row to the first fills in little."""
     near = [{j for j in range(len(S)) if j != i and not is_zero(S[i, j])} for i in range(len(S))]
-    left = set(range(len(S)))
-    eliminated: list[int] = []
-    while left:
-        k = min(left, key=lambda i: (len(near[i] & left), i))
-        left.remove(k)
-        neighbours = near[k] & left
-        for i in neighbours:
-            near[i] |= neighbours - {i}
-        eliminated.append(k)
-    return eliminated[::-1]
+    return minimum_degree(near)[::-1]

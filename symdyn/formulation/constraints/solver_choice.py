@@ -125,8 +125,8 @@ def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) ->
     structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
     if not _holds(found, kept):
         return None, 0
-    samples = found.samples[:, kept]
-    orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)]
+    samples = found.samples.of_rows(kept)
+    orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)].dense()
               if (order := elimination_order(A, structure)) is not None}
     if not orders:
         return None, 0
@@ -135,11 +135,11 @@ def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) ->
     least = min(least_operations(structure, mass, order) for order in sorted(orders))
     if fewest is not None and least > MARGIN * fewest:
         return None, least
-    whole = np.linalg.svd(samples, compute_uv=False)[:, -1]
+    whole = samples.smallest()
 
     def usual(order: tuple[tuple[int, int], ...]) -> float:
         """How far the dependent speeds are from losing their rows, at most of the states."""
-        part = np.linalg.svd(samples[:, :, [column for _, column in order]], compute_uv=False)[:, -1]
+        part = samples.of_columns([column for _, column in order]).smallest()
         return float(np.quantile(part / whole, 0.1))
 
     best = max(sorted(orders), key=usual)
@@ -147,9 +147,9 @@ def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) ->
 
 
 def _holds(found: Ranks, kept: list[int]) -> bool:
-    """Whether there is mass in every direction that the constraints leave."""
-    free = np.linalg.svd(found.samples[0, kept])[2][len(kept):].T
-    if not free.shape[1]:
+    """Whether there is mass in every direction that the constraints leave; there is where every direction has mass."""
+    least = MASSLESS * max(np.abs(found.mass).max(), 1e-300)
+    if np.linalg.eigvalsh(found.mass)[0] > least:
         return True
-    values = np.linalg.eigvalsh(free.T @ found.mass @ free)
-    return bool(values[0] > MASSLESS * max(np.abs(found.mass).max(), 1e-300))
+    free = np.linalg.svd(found.samples[[0]].of_rows(kept).dense()[0])[2][len(kept):].T
+    return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ found.mass @ free)[0] > least)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symdyn.formulation.constraints.consistent_states import FULFILLED, ConstraintStates
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
-from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.floats import evaluate_entries
 from symdyn.tape.kernels import RANK
 
 # Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
@@ -21,6 +22,8 @@ STARTS = 8
 TRIES = 4
 # A row whose part in the combinations of rows that vanish is above this follows from the others.
 REPLACED = 1e-6
+# Parts that differ by less of themselves are the same.
+ALIKE = 1e-9
 # Derivatives smaller than this part of those beside a state vanish there.
 VANISHING = 1e-5
 
@@ -35,7 +38,7 @@ class Ranks:
 
     rank: int
     independent: tuple[int, ...]
-    samples: np.ndarray
+    samples: Sampled
     mass: np.ndarray
     vanishing: tuple[int, ...] = ()
 
@@ -80,8 +83,7 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     q = consistent[:1]
     places = np.concatenate([q, *walked(states, q, stream)])
     samples = scaled(states, places)
-    sizes = np.linalg.svd(samples, compute_uv=False)
-    counts = (sizes > RANK * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
+    counts = samples.ranks()
     rank = int(counts.max(initial=0))
     samples = samples[counts == rank]
     mass = _mass(equations, states, np.concatenate([places, consistent]))
@@ -93,15 +95,15 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
 def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
     """M_tilde at the first of the places (s, n_q) where it exists: not at gimbal lock where a joint follows angles."""
     values = {**states.values, **dict(zip(states.names, places.T, strict=True))}
-    masses = evaluate_rows(equations.tape("M_tilde"), values, len(places))["M_tilde"]
-    there = np.isfinite(masses).all(axis=(1, 2))
-    return masses[int(np.argmax(there))] if there.any() else None
+    masses = Sampled.of_entries(evaluate_entries(equations.tape("M_tilde"), values, len(places))["M_tilde"])
+    there = np.isfinite(masses.values).all(axis=1)
+    return masses[[int(np.argmax(there))]].dense()[0] if there.any() else None
 
 
 def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
     """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those next to them."""
-    here = np.abs(states.at(places)["C_r"]).max(axis=(0, 2), initial=0.0)
-    beside = np.abs(states.at(places + stream.uniform(-0.5, 0.5, places.shape))["C_r"]).max(axis=2, initial=0.0)
+    here = states.at(places).C_r.largest_of_rows().max(axis=0, initial=0.0)
+    beside = states.at(places + stream.uniform(-0.5, 0.5, places.shape)).C_r.largest_of_rows()
     beside = np.where(np.isfinite(beside), beside, 0.0).max(axis=0, initial=0.0)
     return tuple(int(k) for k in np.flatnonzero(states.holonomic & (here <= VANISHING * beside)))
 
@@ -114,7 +116,7 @@ def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator)
     direction[1::2] = -direction[::2]
     for _ in range(STEPS):
         found = states.at(now)
-        onward = _along(scaled_of(states, found), direction)
+        onward = _along(states.scaled(found), direction)
         size = np.linalg.norm(onward, axis=1, keepdims=True)
         if not (size > 1e-6).any():
             return
@@ -127,31 +129,37 @@ def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator)
         yield now
 
 
-def scaled(states: ConstraintStates, q: np.ndarray) -> np.ndarray:
+def scaled(states: ConstraintStates, q: np.ndarray) -> Sampled:
     """C_r (s, n_c, n_u) at coordinates (s, n_q), lengths by lengths."""
-    return scaled_of(states, states.at(q))
+    return states.scaled(states.at(q))
 
 
-def scaled_of(states: ConstraintStates, found: dict[str, np.ndarray]) -> np.ndarray:
-    """The same of what the states give."""
-    turning = np.where(states.angular[None, :], found["length"][:, None], 1.0)
-    return found["C_r"] * found["C_scale"][..., None] / turning[:, None, :]  # type: ignore[no-any-return]
-
-
-def _along(A: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _along(A: Sampled, direction: np.ndarray) -> np.ndarray:
     """Directions (s, n_u) without what the rows of A (s, m, n_u) hold."""
-    held = np.linalg.pinv(A, rcond=RANK) @ (A @ direction[..., None])
-    return direction - held[..., 0]  # type: ignore[no-any-return]
+    return direction - A.least_change(A.times(direction), RANK)
 
 
-def _independent(samples: np.ndarray, rank: int, holonomic: np.ndarray) -> tuple[int, ...]:
+def _independent(samples: Sampled, rank: int, holonomic: np.ndarray) -> tuple[int, ...]:
     """Rows of full rank at the samples (s, n_c, n_u): one after the other the row goes that the others replace best where they
     do it worst, by its part in the combinations of rows that vanish. Velocity constraints that follow from others go before
     constraints of positions, which no velocity constraint replaces."""
-    kept = list(range(samples.shape[1]))
+    kept = list(range(samples.m))
+    left = samples.vanishing(rank) if rank < samples.m else np.zeros((len(samples), samples.m, 0))
     while len(kept) > rank:
-        left = np.linalg.svd(samples[:, kept])[0][:, :, rank:]
         part = np.linalg.norm(left, axis=2).min(axis=0)
         of_speeds = np.where(holonomic[kept], 0.0, part)
-        kept.pop(int((of_speeds if of_speeds.max() > REPLACED else part).argmax()))
+        part = of_speeds if of_speeds.max() > REPLACED else part
+        gone = int(np.argmax(part >= (1 - ALIKE) * part.max()))  # the first, where rounding alone decides
+        kept.pop(gone)
+        left = np.delete(_without(left, gone), gone, axis=1)
     return tuple(kept)
+
+
+def _without(left: np.ndarray, k: int) -> np.ndarray:
+    """Of the combinations (s, m, d) of rows those without row k, orthonormal again, (s, m, d - 1): by a reflection that leaves
+    row k to the first of them."""
+    row = left[:, k] / np.maximum(np.linalg.norm(left[:, k], axis=1, keepdims=True), 1e-300)
+    axis = row + np.eye(row.shape[1])[0] * np.where(row[:, :1] < 0, -1.0, 1.0)
+    square = np.maximum((axis * axis).sum(axis=1), 1e-300)
+    turned = left - 2 * (left @ axis[..., None]) * (axis / square[:, None])[:, None]
+    return turned[..., 1:]  # type: ignore[no-any-return]
