@@ -7,8 +7,11 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+import sympy as sp
 
 import symdyn as sd
+from symdyn.errors import EvaluationError, ModelError, ModelWarning
+from symdyn.formulation.constraints import saddle
 from symdyn.formulation.constraints.null_space import least_operations
 from symdyn.runtime.building.compiler import find_compiler
 
@@ -56,6 +59,34 @@ def test_the_least_of_operations_is_that_of_the_reduced_mass_matrix() -> None:
     assert least_operations(np.zeros((0, n), dtype=bool), np.ones((n, n), dtype=bool), []) == n * (n**2 - 1) // 6
     factors = (n - 1) * ((n - 1)**2 - 1) // 6
     assert least_operations(np.ones((1, n), dtype=bool), np.eye(n, dtype=bool), [(0, 0)]) == factors + n * (n - 1) // 2
+
+
+def test_without_the_numeric_algorithm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mechanisms that are too large for it have the same accelerations, and raise where a pivot vanishes."""
+    usual = net(3, 3).augmented().compile(backend="numpy")
+    monkeypatch.setattr(saddle, "MOST_ON_STACK", 8 * 2000)
+    equations = net(3, 3).augmented()
+    assert usual.places_of_jacobian() is None and equations.otherwise is None
+    assert equations.notes[-1] == ("where a pivot vanishes evaluations raise: the numeric algorithm for 21 speeds and 12 "
+                                   "constraints would take 0.0 MB of the stack, of 0.0 MB that it may take")
+    module = equations.compile(backend="numpy")
+    q, u = module.consistent(u=np.random.default_rng(1).normal(size=21))
+    x = np.concatenate([q, u])
+    assert np.abs(module.rhs(0, x) - usual.rhs(0, x)).max() <= 1e-12 * np.abs(usual.rhs(0, x)).max()
+    x[:3] = x[6:9]  # the knots (0, 1) and (1, 1) at one point, so that the rod between them holds nothing
+    assert module.metadata.q[0:9:6] == ("x0_1", "x1_1")
+    with pytest.raises(EvaluationError, match=r"net_3_3: rhs cannot be evaluated: constraint rod_0_1_1_1 holds nothing here"):
+        module.rhs(0, x)
+
+
+def test_what_has_no_way_without_the_numeric_algorithm_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saddle, "MOST_ON_STACK", 0)
+    x, y = sd.coordinates("x y")
+    with pytest.warns(ModelWarning, match="no state was found"), pytest.raises(
+            ModelError, match=r"the mass matrix alone is singular, .* for 2 speeds and 1 constraints would take .* give"):
+        sd.augmented(coordinates=[x, y], mass=sp.diag(1, 0), force=[0, 0], constraints=[x**2 + y**2 + 1])
+    with pytest.raises(ModelError, match=r"multipliers of least norm are requested, .* leave out constraints that follow"):
+        sd.systems.bricard().augmented().quantity("lam")
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

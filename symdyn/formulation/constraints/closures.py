@@ -43,8 +43,10 @@ class ClosureRow:
 
     def along(self, P: End, Q: End) -> np.ndarray:
         """The row's Jacobian in the joint speeds, (n_w,)."""
-        return vector(*[dot(self.f, Q.Jv[:, k] - P.Jv[:, k]) + dot(self.n_c, Q.Jw[:, k]) + dot(self.n_p, P.Jw[:, k])
-                        for k in range(P.Jv.shape[1])])
+        row = zeros(P.Jv.shape[1])
+        for k in sorted({*P.along, *Q.along}):
+            row[k] = dot(self.f, Q.Jv[:, k] - P.Jv[:, k]) + dot(self.n_c, Q.Jw[:, k]) + dot(self.n_p, P.Jw[:, k])
+        return row
 
     def remaining(self, P: End, Q: End) -> Any:
         """Its second derivative with u_dot = 0."""

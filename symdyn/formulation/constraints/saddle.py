@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from symdyn.errors import ModelError
 from symdyn.formulation.constraints.sampled import minimum_degree
 from symdyn.formulation.trees.mass_matrix import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
@@ -22,8 +23,18 @@ from symdyn.tape.recorder import Recorder
 # A pivot of the Schur complement below this part of its diagonal entry leaves too few digits: a constraint nearly depends
 # on the others, and the kernel takes over. The digits lost are those of this number.
 SMALLEST_PIVOT = 1e-6
+# Bytes on the stack that a numeric algorithm may take; threads have 8 MB on most machines.
+MOST_ON_STACK = 6_000_000
 # Speeds from which on the numeric algorithm takes them in an order of its own.
 ORDERED_FROM = 30
+
+
+def no_room(n_u: int, n_c: int) -> str:
+    """Why numeric algorithms for so many speeds and constraints cannot be had, in words; "" where they can."""
+    room = 8 * (3 * n_u * n_u + n_u * (n_u + 1) // 2 + 2 * n_c * n_u + n_c * n_c)  # with their arguments
+    return "" if room <= MOST_ON_STACK else (
+        f"the numeric algorithm for {n_u} speeds and {n_c} constraints would take {room / 1e6:.1f} MB of the stack, of "
+        f"{MOST_ON_STACK / 1e6:.1f} MB that it may take")
 
 
 class SaddleSolver(Protocol):
@@ -107,7 +118,11 @@ class KernelSolver:
 
 def least_multipliers(recorder: Recorder, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], right: np.ndarray,
                       reason: str) -> np.ndarray:
-    """lam (m,) of C^T lam = right, of least norm after scaling; scales as for KernelSolver."""
+    """lam (m,) of C^T lam = right, of least norm after scaling; scales as for KernelSolver. Raises ModelError for too many."""
+    too_large = no_room(C.shape[1], len(C))
+    if too_large:
+        raise ModelError([f"multipliers of least norm are requested, since constraints depend on others, and {too_large}; leave "
+                          "out constraints that follow from others"])
     kernel = Multipliers((C.shape[1], len(C)), reason)
     return vector(*recorder.call(kernel, [*C.ravel(), *rows, *columns, *right]))
 

@@ -10,9 +10,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from symdyn.errors import ModelWarning
+from symdyn.errors import ModelError, ModelWarning
 from symdyn.formulation.constraints.motion import Constrained
 from symdyn.formulation.constraints.null_space import elimination_order, least_operations
+from symdyn.formulation.constraints.saddle import no_room
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.dependent_rows import Ranks
@@ -33,11 +34,13 @@ MARGIN = 2
 def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
            result: Callable[[Q, Equations | None], AugmentedEquations],
            search: Callable[[Equations], Ranks | None]) -> AugmentedEquations:
-    """The equations with the cheapest accelerations that hold at every state.
+    """The equations with the cheapest accelerations that hold at every state; where the numeric algorithm is too large, at those
+    where no pivot vanishes, which raise there.
 
     derivation   (kernel, independent, pivots) -> quantities, all on one tape; see Constrained
     result       (quantities, the same for states where these fail) -> equations
     search       finds which rows depend on the others; None: unknown
+    Raises ModelError for a singular mass matrix where neither statements nor the numeric algorithm solve.
     """
     quantities = derivation(True, None, None)
     whole = result(quantities, None)
@@ -65,14 +68,21 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
         left = [r.name for k, r in enumerate(rows) if k not in independent]
         notes.append(f"constraints {', '.join(left)}: they depend on the others at every state tried; accelerations come without "
                      f"them, multipliers of least norm with them (rank {found.rank} of {len(rows)})")
+    too_large = no_room(len(quantities.speeds), len(rows))
+    if not ways and too_large:
+        raise ModelError(["the mass matrix alone is singular, no order of elimination of dependent speeds is known, and "
+                          f"{too_large}; give every body mass and inertia, and numbers of all parameters in defaults"], whole.name)
     if not ways:
         notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
         return replace(whole, notes=(*whole.notes, *notes))
     best = min(counts, key=lambda name: counts[name])
     others = [f"{name}, {count}" for name, count in counts.items() if name != best] + others
-    others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
-    notes.append(f"accelerations by {best}: {counts[best]} operations ({'; '.join(others)})")
-    chosen = result(ways[best], whole)
+    if not too_large:
+        others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
+    notes.append(f"accelerations by {best}: {counts[best]} operations" + (f" ({'; '.join(others)})" if others else ""))
+    if too_large:
+        notes.append(f"where a pivot vanishes evaluations raise: {too_large}")
+    chosen = result(ways[best], None if too_large else whole)
     return replace(chosen, notes=(*chosen.notes, *notes))
 
 

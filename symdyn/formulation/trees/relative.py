@@ -24,6 +24,7 @@ class End:
     """A point of a body and a frame on the body, seen from the base link, in its axes.
 
     p (3,), A (3, 3) frame to base components; Jv, Jw (3, n_w): velocity of the point and omega per unit joint speed;
+    along: the places of joint speeds that move the body; others have columns of zeros
     v, omega (3,) with the speeds of the state; a, alpha (3,) accelerations with u_dot = 0 (of the ground: less gravity's)
     """
 
@@ -37,6 +38,7 @@ class End:
     omega: np.ndarray
     a: np.ndarray
     alpha: np.ndarray
+    along: tuple[int, ...]
 
 
 class Relative:
@@ -59,9 +61,9 @@ class Relative:
         Jv, Jw = self._jacobian(pose.link, arm)
         motion = self._motion(pose.link)
         w = self.tree.w
-        none = not len(w)
-        return End(pose, at, origin + arm, R @ (pose.R @ rotation), Jv, Jw, zeros(3) if none else Jv @ w,
-                   zeros(3) if none else R @ motion.omega, R @ motion.at(at), R @ motion.alpha)
+        along = sorted(index for k in self.path(pose.link) for index in self.tree.links[k].speeds)
+        return End(pose, at, origin + arm, R @ (pose.R @ rotation), Jv, Jw, Jv[:, along] @ w[along] if along else zeros(3),
+                   R @ motion.omega if len(w) else zeros(3), R @ motion.at(at), R @ motion.alpha, tuple(along))
 
     def rotation(self, link: int) -> np.ndarray:
         """(3, 3) components in a link's axes to those in the base's."""
