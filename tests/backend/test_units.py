@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import symdyn as sd
+from symdyn.backend import units
 from symdyn.backend.units import LEAST_LINES
 from symdyn.pipeline import emit
 from symdyn.runtime.building import objects
@@ -41,9 +42,22 @@ def check_compiles(text: str, *options: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_long_texts_take_a_lower_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All units of the model but the first one; those that mechanisms share keep theirs."""
+    equations = sd.systems.get("double_wishbone").augmented()
+    monkeypatch.setattr(units, "LEAST_LINES", 50)
+    usual = translation_units(text_of(equations))
+    monkeypatch.setattr(units, "LONG_LINES", 100)
+    found = translation_units(text_of(equations))
+    assert [unit.text for unit in found] == [unit.text for unit in usual]
+    own = [unit.level for unit in found[1:] if not unit.shared]
+    assert len(own) > 1 and set(own) == {"-O1"} and {unit.level for unit in usual if not unit.shared} == {""}
+    assert [unit.level for unit in found if unit.shared] == [unit.level for unit in usual if unit.shared]
+
+
 def test_units_of_a_text() -> None:
-    units = [TranslationUnit("a\n"), TranslationUnit("b\n", True), TranslationUnit("c\n", True, "-O2"), TranslationUnit("d\n")]
-    assert translation_units(joined(units)) == units
+    several = [TranslationUnit("a\n"), TranslationUnit("b\n", True), TranslationUnit("c\n", True, "-O2"), TranslationUnit("d\n")]
+    assert translation_units(joined(several)) == several
     assert translation_units("one\n") == [TranslationUnit("one\n")]
 
 
