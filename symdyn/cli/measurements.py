@@ -119,6 +119,10 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.stiff_cables:run", "stiff cables by sparse and by dense factors; at rest compared with closed forms", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of links (default: 10, 100, 1000)"}), _JSON)),
+    "bridges": Measurement(
+        "symdyn.lab.bridges:run", "footbridges of up to 200 bars: growth, accelerations compared with 60 digits, energy", (
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of bars, each 3 n + 2 (default: 20, 50, 101, 200)"}), _JSON)),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),

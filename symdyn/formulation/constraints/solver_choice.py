@@ -71,7 +71,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     too_large = no_room(len(quantities.speeds), len(rows))
     if not ways and too_large:
         raise ModelError(["the mass matrix alone is singular, no order of elimination of dependent speeds is known, and "
-                          f"{too_large}; give every body mass and inertia, and numbers of all parameters in defaults"], whole.name)
+                          f"{too_large}; give every body mass and inertia, and every parameter a number in defaults"], whole.name)
     if not ways:
         notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
         return replace(whole, notes=(*whole.notes, *notes))
