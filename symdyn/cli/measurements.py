@@ -123,6 +123,10 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.bridges:run", "footbridges of up to 200 bars: growth, accelerations compared with 60 digits, energy", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of bars, each 3 n + 2 (default: 20, 50, 101, 200)"}), _JSON)),
+    "nets": Measurement(
+        "symdyn.lab.nets:run", "nets of rods: growth, accelerations compared with 60 digits, energy", (
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of particles along a side (default: 5, 10)"}), _JSON)),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),

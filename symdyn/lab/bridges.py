@@ -239,13 +239,13 @@ def measure(bars: int) -> Row:
     begun = clock.process_time()
     bridge, equations = design(bars), footbridge(bars).augmented(coordinates="absolute")
     derive = clock.process_time() - begun
-    before = _with_children()
+    before = with_children()
     module = equations.compile(backend="c")
     q, u = swinging(module, bars)
     x = np.concatenate([q, u])
     rhs = module.bind(None).rhs
     rhs(0.0, x)
-    compiled = _with_children() - before
+    compiled = with_children() - before
     places = list(_places(module, bridge).values())
     exact, condition = by_hand(bridge, q[places], u[places])
     error = float(np.abs(rhs(0.0, x)[len(q):][places] - exact).max() / np.abs(exact).max())
@@ -265,7 +265,7 @@ def measure(bars: int) -> Row:
                min(times) * 1e6, error, condition, sol.n_steps, seconds, sol.energy_error(), violation)
 
 
-def _with_children() -> float:
+def with_children() -> float:
     """Processor seconds of this process and of the compilers that it has run."""
     used = os.times()
     return used.user + used.system + used.children_user + used.children_system

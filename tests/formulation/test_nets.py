@@ -4,44 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import EvaluationError, ModelError, ModelWarning
+from symdyn.cli import main
+from symdyn.errors import ArgumentError, EvaluationError, ModelError, ModelWarning
 from symdyn.formulation.constraints import saddle
 from symdyn.formulation.constraints.null_space import least_operations
+from symdyn.lab import nets
+from symdyn.lab.nets import by_hand, moving, net
 from symdyn.runtime.building.compiler import find_compiler
-
-
-def net(rows: int, columns: int) -> sd.System:
-    """Particles that rods join to their neighbours; all hang from the two outer ones of the first row, which stand still."""
-    mass, gravity, length = sd.parameters("m g l")
-    system = sd.System(f"net_{rows}_{columns}", gravity=[0, 0, -gravity])
-    knots: dict[tuple[int, int], Any] = {}
-    depth = np.sqrt(1 - 0.9**2)
-    for i, j in np.ndindex(rows, columns):
-        at = [0.9 * j, depth * (j % 2), -1.0 * i]
-        if i == 0 and j in (0, columns - 1):
-            knots[i, j] = system.ground, at
-            continue
-        parent = system.ground
-        for letter, axis, value in zip("xyz", np.eye(3, dtype=int).tolist(), at, strict=True):
-            q, = sd.coordinates(f"{letter}{i}_{j},")
-            child = system.add_body(f"{letter}_of_{i}_{j}", mass=mass if letter == "z" else 0)
-            system.add_joint(sd.Prismatic(f"slide_{letter}{i}_{j}", parent, child, q, axis=axis))
-            system.initial[q] = value
-            parent = child
-        knots[i, j] = parent, [0, 0, 0]
-    for i, j in knots:
-        for other in ((i, j + 1), (i + 1, j)):
-            if other in knots and not (knots[i, j][0] is knots[other][0] is system.ground):
-                (a, at), (b, there) = knots[i, j], knots[other]
-                system.close_loop(sd.Rod(f"rod_{i}_{j}_{other[0]}_{other[1]}", a, b, length, parent_point=at, child_point=there))
-    system.defaults = {mass: 0.1, gravity: 9.81, length: 1.0}
-    return system
 
 
 def test_elimination_of_many_freedoms_is_not_derived() -> None:
@@ -91,19 +65,23 @@ def test_what_has_no_way_without_the_numeric_algorithm_raises(monkeypatch: pytes
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 def test_accelerations_and_energy() -> None:
-    """Accelerations at a state in motion are those of the whole matrix with 40 digits; the energy of a swing stays."""
+    """Accelerations at a state in motion are those of equations by hand with 60 digits; the energy of a swing stays."""
     module = net(4, 4).augmented().compile()
     n = module.metadata.sizes.u
-    begin = np.random.default_rng(2).normal(size=n)
-    q, u = module.consistent(u=begin)
-    x = np.concatenate([q, u])
-    C_r, F_d = np.reshape(module.evaluate("C_r", 0, x), (-1, n)), module.evaluate("F_d", 0, x)
-    with mpmath.workdps(40):
-        m, rows = mpmath.mpf(0.1), mpmath.matrix(C_r.tolist())
-        weight = mpmath.matrix([-9.81 if name.startswith("z") else 0 for name in module.metadata.q])
-        # With M = m: u_dot = g - C_r^T lam / m, C_r u_dot = F_d.
-        lam = mpmath.lu_solve(rows * rows.T / m, rows * weight - mpmath.matrix(F_d.tolist()))
-        exact = np.array([float(e) for e in weight - rows.T * lam / m])
+    q, u = moving(module)
+    x, exact = np.concatenate([q, u]), by_hand(4, 4, module.metadata.q, q, u)
     assert np.abs(module.rhs(0, x)[n:] - exact).max() <= 1e-12 * np.abs(exact).max()
     sol = module.simulate((0, 1), q, u, rtol=1e-9)
     assert sol.success and sol.energy_error() <= 1e-8 and np.abs(sol.constraint_violation).max() <= 1e-12
+
+
+@pytest.mark.sweep
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+def test_measurement(capsys: pytest.CaptureFixture[str], tmp_path: Any) -> None:
+    assert main(["bench", "nets", "--sizes", "4", "--json", str(tmp_path / "found.json")]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == nets.HEADING and (tmp_path / "found.json").exists()
+
+
+def test_sizes_of_nets() -> None:
+    with pytest.raises(ArgumentError, match=r"3 or more; found 2 10$"):
+        nets.run((2, 10))

@@ -50,8 +50,8 @@ class ConstraintStates:
     def at(self, q: np.ndarray) -> AtStates:
         """What there is at coordinates (s, n_q)."""
         entries = evaluate_entries(self.tape, {**self.values, **dict(zip(self.names, q.T, strict=True))}, len(q))
-        return AtStates(*[entries[name].dense() for name in ("C", "C_scale", "length")],
-                        *[Sampled.of_entries(entries[name]) for name in ("C_r", "N")])
+        C, scale, length = (entries[name].dense() for name in ("C", "C_scale", "length"))
+        return AtStates(C, scale, length, Sampled.of_entries(entries["C_r"]), Sampled.of_entries(entries["N"]))
 
     def nearest(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """From coordinates (s, n_q) the consistent ones nearby by Gauss-Newton, and the largest residual left, relative, (s,).

@@ -44,7 +44,8 @@ class Sampled:
     def of(cls, A: np.ndarray) -> Sampled:
         """Of arrays (s, m, n): entries that are not zero at some state."""
         rows, columns = np.nonzero((A != 0).any(axis=0))
-        return cls(*A.shape[1:], rows, columns, A[:, rows, columns])
+        _, m, n = A.shape
+        return cls(m, n, rows, columns, A[:, rows, columns])
 
     @classmethod
     def of_entries(cls, entries: Entries) -> Sampled:
@@ -194,7 +195,7 @@ class Sampled:
             for a, values in blocks:
                 block[:, first:first + values.shape[1], np.searchsorted(at, a)] = values
                 first += values.shape[1]
-            block = np.linalg.qr(block, mode="r") if first > 1 else block
+            block = np.asarray(np.linalg.qr(block, mode="r")) if first > 1 else block
             kept[:, k] = np.abs(block[:, 0, 0]) > RANK * largest if first else False
             R.append((at, np.where(kept[:, k, None], block[:, 0], 0.0) if first else np.zeros((len(self), len(at)))))
             rest = block[:, :, 1:]
@@ -305,6 +306,6 @@ class Triangular:
             own, others = np.flatnonzero(kept), np.flatnonzero(~kept)[:count]
             R = self._matrix(k)
             parts = self._solver(R[own][:, own]).solve(R[own][:, others].toarray())
-            found[k][np.ix_(self.order[own], range(len(others)))] = -parts
+            found[k][np.ix_(self.order[own], np.arange(len(others)))] = -parts
             found[k, self.order[others], range(len(others))] = 1
         return found
