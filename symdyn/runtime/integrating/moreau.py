@@ -44,16 +44,17 @@ FIRST, MOST = 64, 2**21
 PIECE = 512
 # Velocities by which the laws are missed, m/s, per m/s of the start; gaps, m.
 TOLERANCE, DEPTH = 1e-12, 1e-12
-MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES = 20_000, 60, 30
+MOST_SWEEPS, MOST_ROUNDS = 20_000, 60
 # Change of the last round of a step, by the size of the state, above which the step is too long.
 ACCEPTED = 1e-6
 # The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
 FEW = 12
 GROUP_DENSE = 240
-GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 5e-7, 1e-7, 1.0
-GROUP_SWEEPS, GROUP_ROUGH, GROUP_ROUNDS, GROUP_PASSES = 200, 30, 2, 4
-# Residuals above this many tolerances are reported.
-REPORTED = 1e3
+GROUP_TOLERANCE, GROUP_DEPTH = 5e-7, 1e-7
+# Sweeps of a round, of one to which contacts were just added, and of a step.
+GROUP_SWEEPS, GROUP_ROUGH, GROUP_STEP = 100, 30, 600
+# Residuals and overlaps above this many tolerances are reported; those of groups.
+REPORTED, GROUP_REPORTED = 1e3, 10
 
 
 def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
@@ -184,7 +185,7 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
     touched, reached = stepper.touched(), np.array(done_at, dtype=int)
     stepped = Stepped(np.array(stepper.t), np.array(stepper.h), reached, touched,
                       _losses(module, touched, len(stepper.h))[reached],
-                      record.worst_residual, record.worst_depth)
+                      max(stepper.missed, default=0.0), record.worst_depth, np.array(stepper.missed))
     doubts = [stepper.doubt()] if status >= 0 else []
     phases, row_phases = _phases(module, request, stepped)
     return Outcome(np.array(times), np.array(rows), not status, message, interrupted, len(stepper.h), 0, record.n_evaluations,
@@ -257,6 +258,7 @@ class Stepper:
         self.t: list[float] = []
         self.h: list[float] = []
         self.parts: list[Touched] = []
+        self.missed: list[float] = []
         self.raised: list[BaseException] = []
         self.memory = memory = Memory()
         n_x, n_in = len(request.x0), sizes.inputs
@@ -291,12 +293,11 @@ class Stepper:
         record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
         record.length = request.stabilization.length or 1.0
-        record.most_sweeps, record.most_rounds, record.most_passes = MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES
-        record.accepted = ACCEPTED
+        record.most_sweeps, record.most_rounds, record.accepted = MOST_SWEEPS, MOST_ROUNDS, ACCEPTED
+        self.reported = REPORTED
         if many:
-            record.tolerance, record.depth, record.accepted = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED
-            record.rough_sweeps = GROUP_ROUGH
-            record.most_sweeps, record.most_rounds, record.most_passes = GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES
+            record.tolerance, record.depth, self.reported = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_REPORTED
+            record.most_sweeps, record.rough_sweeps, record.step_sweeps = GROUP_SWEEPS, GROUP_ROUGH, GROUP_STEP
 
     def _frames(self, n_x: int, n_in: int) -> None:
         """What the record calls."""
@@ -347,18 +348,19 @@ class Stepper:
         most, self.step = max(1, int(self.cones.most)), h
         room = most * max(2, min(n, 200_000 // most + 2))
         out, ends = np.zeros((n, len(self.x))), np.zeros(n, dtype=np.dtype("long"))
-        places, values = np.zeros((room, 3), dtype=np.dtype("long")), np.zeros((room, 10))
+        places, values, missed = np.zeros((room, 3), dtype=np.dtype("long")), np.zeros((room, 10)), np.zeros(n)
         done, span = ctypes.c_long(0), np.array([t, h])
         status = self.library.symdyn_moreau_go(
             ctypes.byref(self.record), ctypes.byref(self.cones), *[ctypes.c_void_p(a.ctypes.data) for a in (span, self.x)],
-            ctypes.c_long(n), *[ctypes.c_void_p(a.ctypes.data) for a in (out, ends, places, values)], ctypes.c_long(room),
-            ctypes.byref(done))
+            ctypes.c_long(n), *[ctypes.c_void_p(a.ctypes.data) for a in (out, ends, places, values, missed)],
+            ctypes.c_long(room), ctypes.byref(done))
         k = done.value
         number = int(ends[k - 1]) if k else 0
         self.now = t + k * h
         per_step = np.diff(np.append(0, ends[:k]))
         a, b, state = places[:number].T.copy()
         self.parts.append(Touched(len(self.h) + np.repeat(np.arange(k), per_step), a, b, state, values[:number].copy()))
+        self.missed += missed[:k].tolist()
         self.t += [t + i * h for i in range(k)]
         self.h += [h] * k
         if self.raised and isinstance(self.raised[0], KeyboardInterrupt):
@@ -380,11 +382,14 @@ class Stepper:
     def doubt(self) -> str:
         """What is left of residuals and overlaps, if that is more than meant."""
         record = self.record
-        if record.worst_residual > REPORTED * record.tolerance:
-            return (f"{self.module.name}: the laws of contact and friction are missed by up to {record.worst_residual:.3g} m/s "
-                    "in a step: its contact problem has no solution, or none that the iteration reaches; shorter steps or less "
-                    "friction")
-        if record.worst_depth > REPORTED * record.depth:
+        most, missed = self.reported * record.tolerance, np.array(self.missed)
+        if missed.max(initial=0.0) > most:
+            at = f"in {np.count_nonzero(missed > most)} of {len(missed)} steps by more than {most:.0e} m/s"
+            advice = ("compare the motion with one of half the step, and use what agrees" if record.rough_sweeps else
+                      "its contact problem has no solution, or none that the iteration reaches; shorter steps or less friction")
+            return (f"{self.module.name}: the laws of contact and friction are missed by up to {missed.max():.3g} m/s in a step, "
+                    f"{at}: {advice}")
+        if record.worst_depth > self.reported * record.depth:
             return (f"{self.module.name}: bodies overlap by up to {record.worst_depth:.3g} m at the end of a step, which "
                     "no motion of theirs undoes: contacts that exclude each other, or a step that is too long")
         return ""

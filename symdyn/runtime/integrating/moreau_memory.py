@@ -34,7 +34,7 @@ class Moreau(ctypes.Structure):
     """A mechanism in time stepping; see c/runtime/moreau_type.h."""
 
     _fields_ = fields_of("runtime/moreau_type.h")
-    worst_residual: float
+    rough_sweeps: int
     worst_depth: float
     n_steps: int
     n_rounds: int

@@ -35,6 +35,7 @@ class Stepped:
     touched    see Touched
     losses     energy that contacts have taken up to every stored row, J, (n_t, n_contacts)
     residual   the largest velocity by which a law was missed, m/s; depth: the largest overlap, m
+    missed     the same velocity in every step, (n,), from the velocities at its end
     estimate   largest difference of the coordinates from the run with twice the steps' length; NaN: there was no such run
     """
 
@@ -45,6 +46,7 @@ class Stepped:
     losses: np.ndarray
     residual: float
     depth: float
+    missed: np.ndarray
     estimate: float = math.nan
 
 

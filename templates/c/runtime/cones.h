@@ -142,10 +142,9 @@ static void symdyn_cones_velocities(symdyn_cones *c) {
     }
 }
 
-// w of the present impulses, what each contact does, and how far all are from the laws, m/s.
-static double symdyn_cones_residual(symdyn_cones *c) {
+// What each contact does, and how far all are from the laws by P and w, m/s.
+static double symdyn_cones_missed(symdyn_cones *c) {
     double worst = 0.0;
-    symdyn_cones_velocities(c);
     for (long i = 0; i < c->n; i++) {
         const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
         double z[3], radius;
@@ -157,6 +156,12 @@ static double symdyn_cones_residual(symdyn_cones *c) {
         c->state[i] = lead && !(z[0] > 0.0) ? 0 : m == lead || size > radius || !(radius > 0.0) ? 2 : 1;
     }
     return worst;
+}
+
+// The same by w of the present impulses.
+static double symdyn_cones_residual(symdyn_cones *c) {
+    symdyn_cones_velocities(c);
+    return symdyn_cones_missed(c);
 }
 
 // Rows of a slipping contact: P_t - mu P_n z/|z| = 0 along z/|z| and across it, in place of the rows of D.

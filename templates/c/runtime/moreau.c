@@ -7,7 +7,7 @@
 // begin), behind each other, as far as there is room; ends: how many after each step. Returns 0 or a failure; done: how many
 // steps.
 SYMDYN_EXPORT int symdyn_moreau_go(symdyn_moreau *s, symdyn_cones *c, const double *span, double *x, long n, double *out,
-    long *ends, long *places, double *values, long room, long *done) {
+    long *ends, long *places, double *values, double *missed, long room, long *done) {
     const double begin = span[0], h = span[1];
     long kept = 0;
     for (*done = 0; *done < n; ++*done) {
@@ -24,6 +24,7 @@ SYMDYN_EXPORT int symdyn_moreau_go(symdyn_moreau *s, symdyn_cones *c, const doub
             for (int k = 0; k < 3; k++) values[10 * kept + 7 + k] = s->incoming[3 * i + k];
         }
         ends[*done] = kept;
+        missed[*done] = s->missed;
     }
     return 0;
 }

@@ -269,62 +269,51 @@ static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, int rou
     }
 }
 
-// Iterate on the end of a step, from a first guess in end: once if a rough solution does. Impulses of pairs act along the
-// normals in the middle, their laws hold along those at the end. Returns 0 or a failure.
-static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end, int rough) {
-    double *middle = s->work, *next = s->work + s->n_x, *kick = s->work + 2 * s->n_x, off = 0.0;
+// One round on the end of a step, from a guess in end: what contacts and loads do in the middle, then impulses that keep the laws
+// with the velocities at the end. Impulses of pairs act along the normals in the middle, their laws hold along those at the end.
+// round: how many went before since contacts were added; rough: by few sweeps alone. off: how far the end moved, size: of the
+// state. Returns 0 or a failure.
+static int symdyn_round(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end, int round, int rough,
+    double *off, double *size) {
+    double *middle = s->work, *next = s->work + s->n_x, *kick = s->work + 2 * s->n_x;
     const int n_q = s->n_q, n_u = s->n_u;
-    const int most = rough ? 1 : s->n_found ? s->most_rounds : 60;
-    const double accepted = s->n_found ? s->accepted : 1e-6;
-    for (int round = 0; round < most; round++) {
-        int failed;
-        for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
-        if (s->n_found && (round < 4 || round % 8 == 0)) {
-            failed = symdyn_assemble(s, c, t + 0.5 * h, middle, 0);
-            if (failed) return failed;
-            if (!round) symdyn_bring(s, c, h);
-        }
-        failed = symdyn_rate(s, t + 0.5 * h, middle);
-        if (failed) return failed;
-        for (int i = 0; i < s->n_x; i++) next[i] = x[i] + h * s->xd[i];
-        if (s->n_found) {
-            symdyn_cones_total(c, c->P, c->du);
-            for (int i = 0; i < n_u; i++) next[n_q + i] += kick[i] = c->du[i];
-        }
-        failed = symdyn_settle(s, t + h, next);
-        if (failed) return failed;
-        if (s->n_found) {
-            failed = symdyn_gaps(s, t + h, next);
-            if (failed) return failed;
-            for (long i = 0; i < c->n; i++) {
-                double w[3], kicked[3], basis[9];
-                const long r = c->first[i], m = c->first[i + 1] - r;
-                for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
-                symdyn_contact_now(s, i, m, basis, w);
-                if (s->b[i] >= 0) symdyn_pair_along(s, c, c->entry[i], s->a[i], s->b[i], basis, (int)m);
-                symdyn_cones_along(c, i, kick, kicked);
-                for (long k = 0; k < m; k++) c->free[r + k] = w[k] - kicked[k];
-                if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
-            }
-            symdyn_impulses(s, c, h, s->rough_sweeps && (rough || round + 1 < most));
-            for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
-        }
-        const double last = off;
-        off = 0.0;
-        double size = 0.0;
-        for (int i = 0; i < s->n_x; i++) {
-            off = fmax(off, fabs(next[i] - end[i]));
-            size = fmax(size, fabs(next[i]));
-            end[i] = next[i];
-        }
-        s->n_rounds++;
-        if (!(size <= 1e300)) return SYMDYN_MOREAU_NOT_FINITE;
-        const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
-        const int nearer = off < 0.25 * last && off > 1e-15 * size;  // beyond what is noise in general
-        if (round && off <= noise && !nearer) return 0;
-        if (!rough && round + 1 == most && off > accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
+    int failed = 0;
+    for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
+    if (s->n_found && (round < 4 || round % 8 == 0)) failed = symdyn_assemble(s, c, t + 0.5 * h, middle, 0);
+    if (failed) return failed;
+    if (!round) symdyn_bring(s, c, h);
+    failed = symdyn_rate(s, t + 0.5 * h, middle);
+    if (failed) return failed;
+    for (int i = 0; i < s->n_x; i++) next[i] = x[i] + h * s->xd[i];
+    if (s->n_found) {
+        symdyn_cones_total(c, c->P, c->du);
+        for (int i = 0; i < n_u; i++) next[n_q + i] += kick[i] = c->du[i];
     }
-    return 0;
+    failed = symdyn_settle(s, t + h, next);
+    if (!failed && s->n_found) failed = symdyn_gaps(s, t + h, next);
+    if (failed) return failed;
+    if (s->n_found) {
+        for (long i = 0; i < c->n; i++) {
+            double w[3], kicked[3], basis[9];
+            const long r = c->first[i], m = c->first[i + 1] - r;
+            for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
+            symdyn_contact_now(s, i, m, basis, w);
+            if (s->b[i] >= 0) symdyn_pair_along(s, c, c->entry[i], s->a[i], s->b[i], basis, (int)m);
+            symdyn_cones_along(c, i, kick, kicked);
+            for (long k = 0; k < m; k++) c->free[r + k] = w[k] - kicked[k];
+            if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
+        }
+        symdyn_impulses(s, c, h, rough);
+        for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
+    }
+    *off = *size = 0.0;
+    for (int i = 0; i < s->n_x; i++) {
+        *off = fmax(*off, fabs(next[i] - end[i]));
+        *size = fmax(*size, fabs(next[i]));
+        end[i] = next[i];
+    }
+    s->n_rounds++;
+    return *size <= 1e300 ? 0 : SYMDYN_MOREAU_NOT_FINITE;
 }
 
 // Keep what contacts did: what the next step starts from, velocities and gaps at the end.
@@ -338,6 +327,12 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
         for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
         for (int k = 0; k < 4; k++) end[k] = 0.0;
         end[0] = symdyn_contact_now(s, i, m, basis, end + 1);
+        for (long k = 0; k < m; k++) c->w[r + k] = end[1 + k];
+        if (!c->bounded[i] && s->incoming[3 * i] < 0.0) c->w[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
+    }
+    s->missed = s->n_found ? symdyn_cones_missed(c) : 0.0;
+    for (long i = 0; i < s->n_found; i++) {
+        const long r = c->first[i], m = c->first[i + 1] - r;
         for (int k = 0; k < 3; k++) s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
         s->old_a[i] = s->a[i];
         s->old_b[i] = s->b[i];
@@ -348,7 +343,6 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
     s->old_from[s->n_bodies] = s->n_old;
     for (long body = s->n_bodies - 1; body >= 0; body--)
         if (s->old_from[body] < 0) s->old_from[body] = s->old_from[body + 1];
-    s->worst_residual = fmax(s->worst_residual, s->n_found ? c->residual : 0.0);
     return 0;
 }
 
@@ -414,9 +408,61 @@ static int symdyn_begin(symdyn_moreau *s, double t, const double *x) {
     return 0;
 }
 
-// One step from (t, x), in place.
+// Whether the rounds on the end of a step, of which round is the latest since contacts were added, are over, by how far the
+// latest two moved it; left: sweeps that the step may still take. Returns 1, or 0; or a failure.
+static int symdyn_settled(
+    const symdyn_moreau *s, const symdyn_cones *c, int round, double off, double last, double size, long left) {
+    const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
+    const int most = s->n_found ? s->most_rounds : 60;
+    if (s->n_found && s->rough_sweeps)
+        return left <= 0 || round + 1 >= most || (round && off <= noise && c->residual <= s->tolerance);
+    const int nearer = off < 0.25 * last && off > 1e-15 * size;  // beyond what is noise in general
+    if (round && off <= noise && !nearer) return 1;
+    if (round + 1 < most) return 0;
+    return off > (s->n_found ? s->accepted : 1e-6) * (1.0 + size) ? SYMDYN_MOREAU_LONG_STEP : 1;
+}
+
+// Put the end of a step where loads in the middle and the present impulses take it, as far as the latest round left that open.
+static int symdyn_follow(symdyn_moreau *s, const symdyn_cones *c, double t, double h, const double *x, double *end) {
+    double *middle = s->work, *next = s->work + s->n_x, off = 1.0, size = 0.0;
+    for (int round = 0; round < 60 && off > 1e-13 * size; round++) {
+        for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
+        int failed = symdyn_rate(s, t + 0.5 * h, middle);
+        if (failed) return failed;
+        for (int i = 0; i < s->n_x; i++) next[i] = x[i] + h * s->xd[i];
+        for (int i = 0; i < s->n_u; i++) next[s->n_q + i] += c->du[i];
+        failed = symdyn_settle(s, t + h, next);
+        if (failed) return failed;
+        off = size = 0.0;
+        for (int i = 0; i < s->n_x; i++) {
+            off = fmax(off, fabs(next[i] - end[i]));
+            size = fmax(size, fabs(next[i]));
+            end[i] = next[i];
+        }
+    }
+    return off > 1e-6 * (1.0 + size) ? SYMDYN_MOREAU_LONG_STEP : 0;
+}
+
+// Add contacts that close until the middle of a step that ends at end; the first time after those that touch at its begin.
+static int symdyn_watch(
+    symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, const double *end, int first, int *added) {
+    double *middle = s->work;
+    int failed = 0, more = 0;
+    *added = 0;
+    if (first) failed = symdyn_gaps(s, t, x);
+    if (first && !failed) failed = symdyn_add(s, c, added);
+    for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
+    if (!failed) failed = symdyn_gaps(s, t + 0.5 * h, middle);
+    if (!failed) failed = symdyn_add(s, c, &more);
+    *added |= more;
+    return failed || !*added ? failed : symdyn_begin(s, t, x);
+}
+
+// One step from (t, x), in place: the motion without contacts, then rounds with those that touch at its begin and those whose gap
+// closes until its middle. They are over only where the latest one makes no further gap close: contacts are only added, so that
+// there is a last one.
 static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, double h, double *x) {
-    double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x;
+    double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x, off = 0.0, size = 0.0;
     int failed = symdyn_rate(s, t, x);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = x[i] + 0.5 * h * s->xd[i];
@@ -424,27 +470,25 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) end[i] = x[i] + h * s->xd[i];
     s->n_found = c->n = 0;
-    failed = symdyn_rounds(s, c, t, h, x, end, 0);  // without contacts: what they are looked for with
-    if (failed) return failed;
-    for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
-    int added = 0, rough = 0;
-    failed = symdyn_gaps(s, t, x);
-    if (!failed) failed = symdyn_add(s, c, &added);  // what touches already
-    if (failed) return failed;
-    for (int pass = 0; pass < s->most_passes; pass++) {
-        int more = 0;
-        failed = symdyn_gaps(s, t + 0.5 * h, guess);
-        if (!failed) failed = symdyn_add(s, c, &more);
+    const long last_sweep = c->n_sweeps + s->step_sweeps;
+    for (int round = 0, settled = 0, watched = 0;; round++) {
+        int added = 0;
+        if (settled || (watched && s->rough_sweeps)) {
+            failed = symdyn_watch(s, c, t, h, x, end, !watched, &added);
+            if (failed) return failed;
+            if (settled && !added) break;
+            watched = 1;
+            if (added) round = 0;
+        }
+        const int rough = added && s->rough_sweeps;
+        const double last = round ? off : 0.0;
+        failed = symdyn_round(s, c, t, h, x, end, round, rough, &off, &size);
         if (failed) return failed;
-        if (!more && !added && !rough) break;
-        added = 0;
-        rough = s->rough_sweeps && pass + 1 < s->most_passes;
-        failed = symdyn_begin(s, t, x);
-        if (!failed) failed = symdyn_rounds(s, c, t, h, x, end, rough);
-        if (failed) return failed;
-        for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
+        settled = rough ? 0 : symdyn_settled(s, c, round, off, last, size, last_sweep - c->n_sweeps);
+        if (settled < 0) return settled;
     }
-    failed = symdyn_keep(s, c, t + h, end);
+    if (s->n_found && s->rough_sweeps) failed = symdyn_follow(s, c, t, h, x, end);
+    if (!failed) failed = symdyn_keep(s, c, t + h, end);
     if (!failed) failed = symdyn_part(s, c, t + h, end);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) x[i] = end[i];

@@ -39,10 +39,10 @@ typedef struct {
 
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
-    long rough_sweeps;                // of one whose solution is a guess for the next; 0: as many as of the others
+    long rough_sweeps;                // of one to which contacts were just added; 0: as many as of the others
+    long step_sweeps;                 // of a step with rough solutions, after which its rounds end
     double accepted;                  // change of the last round with contacts, by the size of the state
-    int most_passes;                  // of a step, in which further contacts may close
-    int most_rounds;                  // of a step
+    int most_rounds;                  // since contacts were added
     double *work;                     // 8*n_x + n_rows + 16*n_given
     double *response;                 // n_bodies*6*n_speeds: M^-1 B^T
 
@@ -52,9 +52,10 @@ typedef struct {
     double *P_old, *basis, *incoming;
     double *P_guess;  // impulses of the pass before, at was_at of each contact; -1: it is new
     long *was_at;
-    long n_found;                        // contacts of the latest step
-    double *at_end;                      // n*4: gap, then relative velocities at its end
-    double worst_residual, worst_depth;  // of all steps so far
+    long n_found;        // contacts of the latest step
+    double *at_end;      // n*4: gap, then relative velocities at its end
+    double missed;       // by how much the laws are missed at the end of the latest step, m/s
+    double worst_depth;  // of all steps so far
     long n_steps, n_rounds, n_evaluations;
     int reason;
 } symdyn_moreau;

@@ -1,0 +1,98 @@
+"""Shocks along rows of spheres: all contacts that close within a step, motions from impact to impact, energy, misses reported."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.errors import SimulationWarning
+from symdyn.lab import many_contacts
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating import moreau
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+R, N = 0.05, 40
+
+
+def row(n: int, restitution: float) -> sd.Module:
+    """Spheres of 1 kg in a row without gravity."""
+    system = sd.System("row", gravity=[0, 0, 0])
+    bodies = [system.add_body(f"ball_{k}", mass=1.0, inertia=[0.4 * R**2] * 3) for k in range(n)]
+    for k, body in enumerate(bodies):
+        system.add_joint(sd.Free(f"joint_{k}", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.ContactGroup("row", bodies, sd.contacts.Sphere(R), restitution=restitution))
+    return system.compile()
+
+
+def along(x: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:
+    """Coordinates and speeds of spheres at x with velocities v along their row."""
+    q, u = np.zeros((len(x), 7)), np.zeros((len(x), 6))
+    q[:, 0], q[:, 3], u[:, 0] = x, 1, v
+    return {"q": q.ravel(), "u": u.ravel()}
+
+
+def from_impact_to_impact(x: np.ndarray, v: np.ndarray, restitution: float, end: float) -> np.ndarray:
+    """Positions of equal spheres on a line, each impact at its instant, from the formulas of two bodies."""
+    x, v, t = x.copy(), v.copy(), 0.0
+    while True:
+        closing = v[:-1] - v[1:]
+        left = np.diff(x) - 2 * R
+        when = np.where(closing > 1e-14, np.maximum(left, 0.0) / np.maximum(closing, 1e-14), np.inf)
+        k = int(np.argmin(when))
+        if not t + when[k] < end:
+            return x + v * (end - t)
+        x, t = x + v * when[k], t + when[k]
+        mean, half = (v[k] + v[k + 1]) / 2, restitution * closing[k] / 2
+        v[k], v[k + 1] = mean - half, mean + half
+
+
+@pytest.mark.parametrize("n", [10, N])
+def test_a_shock_closes_all_gaps_of_a_row_within_one_step(n: int) -> None:
+    """Without restitution all spheres go on with the mean velocity; a look that is left out would leave some at rest."""
+    x = np.arange(n) * (2 * R + 1e-6)
+    solution = row(n, 0.0).simulate((0, 2e-3), method="moreau", step=1e-3, **along(x, np.eye(n)[0]))
+    stepped = solution.stepped
+    assert stepped is not None and stepped.residual < 1e-5
+    assert len(stepped.touched.a[stepped.touched.step == 0]) == n - 1
+    np.testing.assert_allclose(solution.u[1].reshape(n, 6)[:, 0], 1 / n, atol=1e-5)
+    assert solution.u[1].reshape(n, 6)[:, 0].sum() == pytest.approx(1, abs=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.6])
+def test_impacts_in_a_row_are_of_first_order_in_the_step(restitution: float) -> None:
+    generator, n = np.random.default_rng(3), 20
+    x = np.cumsum(2 * R + generator.uniform(0.01, 0.03, n))
+    v = generator.normal(0, 0.3, n)
+    exact = from_impact_to_impact(x, v, restitution, 0.4)
+    module = row(n, restitution)
+    errors = []
+    for step in (2e-3, 5e-4, 1.25e-4):
+        solution = module.simulate((0, 0.4), method="moreau", step=step, **along(x, v))
+        errors.append(np.abs(solution.q[-1].reshape(n, 7)[:, 0] - exact).max())
+        assert solution.u[-1].reshape(n, 6)[:, 0].sum() == pytest.approx(v.sum(), abs=1e-11)
+    assert errors[0] < 1e-3
+    assert errors[2] < errors[0] / 8  # first order: 1/16
+
+
+def test_contacts_without_restitution_take_energy_in_every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(many_contacts, "RESTITUTION", 0.0)
+    system, start = many_contacts.box(N)
+    solution = system.compile().simulate((0, 0.4), q=start, method="moreau", step=2e-3)
+    stepped = solution.stepped
+    assert stepped is not None
+    assert np.diff(stepped.losses, axis=0).min() > -1e-5 * stepped.losses[-1]  # the laws are missed by up to 1e-5 m/s
+    assert stepped.losses[-1] > 1
+
+
+def test_misses_of_a_solution_that_was_cut_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(moreau, "GROUP_STEP", 10)
+    monkeypatch.setattr(moreau, "GROUP_SWEEPS", 5)
+    monkeypatch.setattr(moreau, "GROUP_ROUGH", 2)
+    system, start = many_contacts.box(N)
+    with pytest.warns(SimulationWarning, match=r"missed by up to .* m/s in a step, in \d+ of 60 steps by more than 5e-06 m/s: "
+                                               "compare the motion with one of half the step"):
+        solution = system.compile().simulate((0, 0.3), q=start, method="moreau", step=5e-3)
+    stepped = solution.stepped
+    assert stepped is not None and stepped.residual == stepped.missed.max() > 5e-6
+    np.testing.assert_allclose(stepped.missed, many_contacts.missed(solution), rtol=1, atol=1e-6)  # from what was recorded
