@@ -28,7 +28,7 @@ def test_balls_fall_into_a_box_and_keep_the_laws_of_contact() -> None:
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("n", swept([20, 40], 20))
 def test_laws_hold_along_the_normals_at_the_end_of_a_step(n: int) -> None:
-    """More balls than are solved to rounding, in two rounds of a step only: the residual that is reported is that of the laws."""
+    """More balls than are solved to rounding, by sweeps alone: the residual that is reported is that of the laws."""
     system, start = many_contacts.box(n)
     solution = system.compile().simulate((0, 0.3), q=start, method="moreau", step=many_contacts.STEP)
     stepped = solution.stepped

@@ -47,12 +47,11 @@ TOLERANCE, DEPTH = 1e-12, 1e-12
 MOST_SWEEPS, MOST_ROUNDS = 20_000, 60
 # Change of the last round of a step, by the size of the state, above which the step is too long.
 ACCEPTED = 1e-6
-# The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
+# The same in groups of more bodies than FEW, whose problems are solved by sweeps alone.
 FEW = 12
-GROUP_DENSE = 240
-GROUP_TOLERANCE, GROUP_DEPTH = 5e-7, 1e-7
-# Sweeps of a round, of one to which contacts were just added, and of a step.
-GROUP_SWEEPS, GROUP_ROUGH, GROUP_STEP = 100, 30, 600
+GROUP_TOLERANCE, GROUP_DEPTH = 3e-7, 1e-7
+# Sweeps of a round, of one to which contacts were just added; rounds since then; contacts of all sweeps in a step.
+GROUP_SWEEPS, GROUP_ROUGH, GROUP_ROUNDS, GROUP_UPDATES = 1000, 30, 10, 400_000
 # Residuals and overlaps above this many tolerances are reported; those of groups.
 REPORTED, GROUP_REPORTED = 1e3, 10
 
@@ -273,7 +272,7 @@ class Stepper:
             most += room_of(groups)
             entries += 2 * n_speeds(groups) * room_of(groups)
         many = record.n_bodies > FEW
-        self.cones: Cones = cones(memory, sizes.u, most, entries, min(GROUP_DENSE if many else MOST_DENSE, 3 * most))
+        self.cones: Cones = cones(memory, sizes.u, most, entries, 0 if many else min(MOST_DENSE, 3 * most))
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))
@@ -294,10 +293,11 @@ class Stepper:
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
         record.length = request.stabilization.length or 1.0
         record.most_sweeps, record.most_rounds, record.accepted = MOST_SWEEPS, MOST_ROUNDS, ACCEPTED
-        self.reported = REPORTED
+        record.step_updates, self.reported = np.iinfo(np.dtype("long")).max, REPORTED
         if many:
             record.tolerance, record.depth, self.reported = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_REPORTED
-            record.most_sweeps, record.rough_sweeps, record.step_sweeps = GROUP_SWEEPS, GROUP_ROUGH, GROUP_STEP
+            record.most_sweeps, record.rough_sweeps = GROUP_SWEEPS, GROUP_ROUGH
+            record.most_rounds, record.step_updates = GROUP_ROUNDS, GROUP_UPDATES
 
     def _frames(self, n_x: int, n_in: int) -> None:
         """What the record calls."""

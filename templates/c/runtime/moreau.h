@@ -251,17 +251,13 @@ static int symdyn_slips(const symdyn_moreau *s, const symdyn_cones *c, long i) {
 // Solve for the impulses; contacts that stuck and slip now have kinetic friction. rough: by few sweeps alone, which say nothing
 // of slip.
 static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, int rough) {
-    if (rough) {
-        const long most_dense = c->most_dense;
-        c->most_dense = 0;
-        symdyn_cones_solve(c, s->tolerance, s->rough_sweeps);
-        c->most_dense = most_dense;
-        return;
-    }
     for (int again = 1; again;) {
-        symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
+        const long begun = c->n_sweeps, left = c->n ? s->updates_left / c->n : 0;
+        const long most = left < s->most_sweeps ? left : s->most_sweeps;
+        symdyn_cones_solve(c, s->tolerance, rough || most < s->rough_sweeps ? s->rough_sweeps : most);
+        s->updates_left -= (c->n_sweeps - begun) * c->n;
         again = 0;
-        for (long i = 0; i < c->n; i++)
+        for (long i = 0; i < c->n && !rough; i++)
             if (!s->broken[i] && symdyn_slips(s, c, i)) {
                 s->broken[i] = again = 1;
                 c->friction[i] = symdyn_bound(s, i, 0, h);
@@ -409,13 +405,13 @@ static int symdyn_begin(symdyn_moreau *s, double t, const double *x) {
 }
 
 // Whether the rounds on the end of a step, of which round is the latest since contacts were added, are over, by how far the
-// latest two moved it; left: sweeps that the step may still take. Returns 1, or 0; or a failure.
-static int symdyn_settled(
-    const symdyn_moreau *s, const symdyn_cones *c, int round, double off, double last, double size, long left) {
+// latest two moved it. Returns 1, or 0; or a failure.
+static int symdyn_settled(const symdyn_moreau *s, const symdyn_cones *c, int round, double off, double last, double size) {
     const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
     const int most = s->n_found ? s->most_rounds : 60;
     if (s->n_found && s->rough_sweeps)
-        return left <= 0 || round + 1 >= most || (round && off <= noise && c->residual <= s->tolerance);
+        return s->updates_left < s->rough_sweeps * c->n || round + 1 >= most
+            || (round && off <= noise && c->residual <= s->tolerance);
     const int nearer = off < 0.25 * last && off > 1e-15 * size;  // beyond what is noise in general
     if (round && off <= noise && !nearer) return 1;
     if (round + 1 < most) return 0;
@@ -470,7 +466,7 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) end[i] = x[i] + h * s->xd[i];
     s->n_found = c->n = 0;
-    const long last_sweep = c->n_sweeps + s->step_sweeps;
+    s->updates_left = s->step_updates;
     for (int round = 0, settled = 0, watched = 0;; round++) {
         int added = 0;
         if (settled || (watched && s->rough_sweeps)) {
@@ -484,7 +480,7 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
         const double last = round ? off : 0.0;
         failed = symdyn_round(s, c, t, h, x, end, round, rough, &off, &size);
         if (failed) return failed;
-        settled = rough ? 0 : symdyn_settled(s, c, round, off, last, size, last_sweep - c->n_sweeps);
+        settled = rough ? 0 : symdyn_settled(s, c, round, off, last, size);
         if (settled < 0) return settled;
     }
     if (s->n_found && s->rough_sweeps) failed = symdyn_follow(s, c, t, h, x, end);

@@ -40,7 +40,7 @@ typedef struct {
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
     long rough_sweeps;                // of one to which contacts were just added; 0: as many as of the others
-    long step_sweeps;                 // of a step with rough solutions, after which its rounds end
+    long step_updates, updates_left;  // contacts of all sweeps in a step, after which its rounds end
     double accepted;                  // change of the last round with contacts, by the size of the state
     int most_rounds;                  // since contacts were added
     double *work;                     // 8*n_x + n_rows + 16*n_given
