@@ -130,9 +130,9 @@ class NoEquilibrium(SymdynError, ArithmeticError):
     """No state of rest, or no periodic motion, was found; the message says what is left, in numbers. `found` holds the motions
     that were found before, where several were to be followed."""
 
-    def __init__(self, message: str = "", found: Sequence[object] = ()) -> None:
+    def __init__(self, message: str = "", result: Sequence[object] = ()) -> None:
         super().__init__(message)
-        self.found = list(found)
+        self.found = list(result)
 
 
 class EquilibriumNotUnique(NoEquilibrium):

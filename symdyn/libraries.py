@@ -20,7 +20,7 @@ from symdyn.functions import groups
 from symdyn.functions.packed import places
 from symdyn.functions.table import BATCH
 from symdyn.functions.tapes import all_columns_of
-from symdyn.runtime.building.library import Unit
+from symdyn.runtime.building.library import Library
 from symdyn.runtime.building.texts import Texts
 from symdyn.tape.jumps import breaks
 from symdyn.tape.tape import Tape
@@ -74,7 +74,7 @@ class Libraries:
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                     batch=what == BATCH, rolled=self.rolled)
 
-    def __call__(self, what: str | RightSide) -> Unit:
+    def __call__(self, what: str | RightSide) -> Library:
         """The library for a right-hand side, or that holds a function."""
         if what not in self.texts:
             source = self.rhs if what == RightSide() else self._source(what)
@@ -95,8 +95,8 @@ class Libraries:
     def breaks(self) -> Tape | None:
         """What passes zero where the right-hand side has a kink or a jump, as `surfaces`; None where it has none."""
         recorder = self.equations.recorder
-        found = breaks(recorder, self.equations.quantity("rhs").tolist())
-        return Tape.of(recorder, surfaces=np.array(found, dtype=object)) if found else None
+        result = breaks(recorder, self.equations.quantity("rhs").tolist())
+        return Tape.of(recorder, surfaces=np.array(result, dtype=object)) if result else None
 
     def base_names(self) -> tuple[str, ...]:
         """Names of the base parameters of the mechanism."""

@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 import symdyn
 
+# In place of these words, names have those of docs/style.md and of the glossary: singular_fallback, vanishing_pivots, reject.
+NOT_NAMES = {"otherwise", "lockable", "locking", "told", "tells", "beside", "anew", "mend", "refuse", "refused", "doctor",
+             "yardstick", "contest", "painter", "lumping"}
 PACKAGE = Path(symdyn.__file__).parent
 PAGE = Path(__file__).parents[1] / "docs" / "architecture.md"
 
@@ -31,12 +34,14 @@ def upward() -> set[str]:
 
 
 class File(NamedTuple):
-    """Path in the package, name of the first level, statements at the top, and what tests look at: imports, attributes, `if`."""
+    """Path in the package, name of the first level, statements at the top, what tests look at (imports, attributes, `if`), and
+    the words of its names."""
 
     path: str
     own: str
     top: list[ast.stmt]
     nodes: list[ast.AST]
+    words: set[str]
 
 
 @functools.cache
@@ -46,7 +51,14 @@ def files() -> list[File]:
              if inside.parts[0] not in ("__init__.py", "__main__.py")]
     kinds = ast.Import, ast.ImportFrom, ast.Attribute, ast.If
     return [File(inside.as_posix(), inside.parts[0].removesuffix(".py"), tree.body,
-                 [node for node in ast.walk(tree) if isinstance(node, kinds)]) for inside, tree in trees]
+                 [node for node in ast.walk(tree) if isinstance(node, kinds)], words_of(tree)) for inside, tree in trees]
+
+
+def words_of(tree: ast.Module) -> set[str]:
+    """Words of the names that a file gives to variables, arguments, functions and classes."""
+    names = {node.id if isinstance(node, ast.Name) else node.arg if isinstance(node, ast.arg) else node.name
+             for node in ast.walk(tree) if isinstance(node, ast.Name | ast.arg | ast.FunctionDef | ast.ClassDef)}
+    return {word for name in names for word in name.lower().split("_")}
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -75,7 +87,7 @@ def test_imports_go_down_the_table() -> None:
     """At the top of a file only what stands in an earlier row; inside functions of the listed files also what comes later."""
     rows, allowed = layers(), upward()
     wrong, used = [], set()
-    for path, own, statements, nodes in files():
+    for path, own, statements, nodes, _ in files():
         top, types = set(statements), for_types(nodes)
         for node in nodes:
             for name in imported(node) if node not in types else ():
@@ -90,7 +102,7 @@ def test_imports_go_down_the_table() -> None:
 def test_public_names_are_for_what_stands_on_them() -> None:
     """Up to the stress tests, the package itself is imported for its version and its folder alone."""
     rows = layers()
-    for path, own, _, nodes in files():
+    for path, own, _, nodes, _ in files():
         if rows[own] <= rows["comparison"]:
             names = [n for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)
                      and n.value.id in ("symdyn", "sd")]
@@ -98,13 +110,18 @@ def test_public_names_are_for_what_stands_on_them() -> None:
 
 
 def test_only_the_command_line_runs_the_laboratory() -> None:
-    outside = [f"{path} imports symdyn.{name}" for path, own, _, nodes in files() if own not in ("lab", "cli")
+    outside = [f"{path} imports symdyn.{name}" for path, own, _, nodes, _ in files() if own not in ("lab", "cli")
                for node in nodes for name in imported(node) if name == "lab"]
     assert not outside
 
 
 def test_the_recursions_of_the_lecture_are_no_source_of_code() -> None:
     """They print pages, and verification compares the lean ones with them."""
-    readers = {path for path, _, _, nodes in files() for node in nodes if isinstance(node, ast.ImportFrom)
+    readers = {path for path, _, _, nodes, _ in files() for node in nodes if isinstance(node, ast.ImportFrom)
                and (node.module or "").startswith("symdyn.formulation.textbook") and "formulation/textbook" not in path}
     assert readers == {"formulation/trees/recursive.py"}
+
+
+def test_names_have_the_words_of_the_field() -> None:
+    assert {file.path: file.words & NOT_NAMES for file in files() if file.words & NOT_NAMES} == {}
+    assert words_of(ast.parse("def told(beside):\n    is_locking = beside")) == {"told", "beside", "is", "locking"}

@@ -187,7 +187,7 @@ class _Search:
         positions = equations.quantity("positions")
         p = m.momenta()
         sums = equations.quantity("momentum") if "momentum" in equations.quantities else None
-        found = []
+        result = []
         for turning in (False, True):
             for axis in ((2,) if planar and turning else range(2 if planar else 3)):
                 e = [int(k == axis) for k in range(3)]
@@ -206,8 +206,8 @@ class _Search:
                         total = sums[(2 if planar else axis) if turning else 3 + axis]
                         if _close(*self._numbers([total, value])):
                             gaps, value = [*gaps, total - value], total
-                    found.append(_Candidate(f"{'H' if turning else 'P'}_{where}", f"{what} {where}", value, w, tuple(gaps)))
-        return found
+                    result.append(_Candidate(f"{'H' if turning else 'P'}_{where}", f"{what} {where}", value, w, tuple(gaps)))
+        return result
 
     def _speeds(self, J: np.ndarray, target: np.ndarray) -> np.ndarray | None:
         """w with J w = target, by rows with orthonormal columns, such as rotations, which divide by nothing, or by those that say
@@ -290,7 +290,7 @@ class _Search:
         """Coordinates that neither T and V hold nor the loads and constraints; notes say what changes the momenta of these, and
         which ones stand in loads or constraints alone."""
         m, equations = self.m, self.equations
-        found = []
+        result = []
         coordinates = equations.symbols.coordinates
         # Where speeds are no rates of coordinates, T holds a coordinate that these rates hold.
         in_energy = self._absent([m.T, *([] if self.by_hand else [m.V]), *m.rates])
@@ -302,7 +302,7 @@ class _Search:
             if stands:
                 self.notes.append(f"{coordinates[k]} is not cyclic: it stands in {' and '.join(stands)}, though not in T and V")
                 continue
-            found.append(coordinates[k])
+            result.append(coordinates[k])
             p = candidates[k]
             if not m.plain or self.proof(p).proved:
                 continue
@@ -312,7 +312,7 @@ class _Search:
                 rate = self._shown(F[k])
                 self.notes.append(f"{p.name} is not conserved: its rate is {rate}" if rate
                                   else f"{p.name} is not conserved: loads without potential change it")
-        return tuple(found)
+        return tuple(result)
 
     def _absent(self, entries: Any, among: Iterable[int] | None = None) -> set[int]:
         """Indices of coordinates that entries do not hold."""

@@ -140,13 +140,13 @@ def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, val
 
 def _positive(seconds: Any, name: str) -> float:
     try:
-        found = number(seconds)
+        result = number(seconds)
     except NotReal as error:
         raise ArgumentError(f"{name}: seconds must be a positive number, found {shown(seconds)}: {error}") from None
-    if not 0 < found <= threading.TIMEOUT_MAX:
+    if not 0 < result <= threading.TIMEOUT_MAX:
         raise ArgumentError(f"{name}: seconds must be a positive number up to {threading.TIMEOUT_MAX:.3g}, found "
                             f"{shown(seconds)}")
-    return found
+    return result
 
 
 @dataclass(frozen=True)
@@ -206,8 +206,8 @@ class _Search:
         self.multipliers = list(multipliers.values())
         self.unknown: list[sp.Symbol] = [*self.coordinates, *states, *self.multipliers]
         # In their shortest form sums of angles stand as such, so that they become base angles.
-        found = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
-        self.entries = [with_known_angles(e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)})) for e in found]
+        result = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
+        self.entries = [with_known_angles(e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)})) for e in result]
         if any(time in symbols_of(e) for e in self.entries):
             raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but the time stands in its "
                               "equations, so that a state of rest at one time is none at another; use module.periodic, or "
@@ -338,9 +338,9 @@ class _Search:
             left[k] = e = factors[0]
             case = _Case((e, *rest), case.found, case.angles, case.conditions)
             unknowns = self._unknowns(e)
-            found = self._single(case, e, unknowns[0]) if len(unknowns) == 1 else None
-            if found is not None:
-                return found
+            result = self._single(case, e, unknowns[0]) if len(unknowns) == 1 else None
+            if result is not None:
+                return result
             linear = self._linear(case, e)
             if linear is not None:
                 return [linear]
@@ -388,8 +388,8 @@ class _Search:
         below = matrix.det(method="berkowitz")
         if _proved(below) or _vanishes(below):
             return None
-        found = matrix.adjugate() * right / below
-        return _Case((), case.found, case.angles, case.conditions).put(dict(zip(unknown, found, strict=True)))
+        result = matrix.adjugate() * right / below
+        return _Case((), case.found, case.angles, case.conditions).put(dict(zip(unknown, result, strict=True)))
 
     def _closed(self, case: _Case) -> _Case | None:
         """Sine and cosine of an angle eliminated from two equations in which they stand linearly, as where a loop closes:
@@ -405,8 +405,8 @@ class _Search:
                 self._assume(regular)
                 sine, cosine = (sp.factor(e) for e in matrix.adjugate() * sp.Matrix([-p.coeff_monomial(1) for p in (one, other)])
                                 / regular)
-                found = case.put({s: sine, c: cosine}, {k: sp.atan2(sine, cosine)})
-                return replace(found, left=(*found.left, sine**2 + cosine**2 - 1))
+                result = case.put({s: sine, c: cosine}, {k: sp.atan2(sine, cosine)})
+                return replace(result, left=(*result.left, sine**2 + cosine**2 - 1))
         return None
 
     def _single(self, case: _Case, e: sp.Expr, unknown: Any) -> list[_Case] | None:
@@ -430,14 +430,14 @@ class _Search:
         # a(c) + s b(c) = 0: a^2 = (1 - c^2) b^2.
         q = sp.Poly(e, s)
         a, b = q.coeff_monomial(1), q.coeff_monomial(s)
-        found = []
+        result = []
         for x in sp.Poly(sp.expand(a**2 - (1 - c**2) * b**2), c).real_roots():
             if sp.Abs(x) > 1:
                 continue
             slope = b.subs(c, x)
             sines = [-a.subs(c, x) / slope] if slope != 0 else [sp.sqrt(1 - x**2), -sp.sqrt(1 - x**2)]
-            found += [case.put({s: y, c: x}, {unknown: sp.atan2(y, x)}) for y in dict.fromkeys(sines)]
-        return found
+            result += [case.put({s: y, c: x}, {unknown: sp.atan2(y, x)}) for y in dict.fromkeys(sines)]
+        return result
 
     def _roots(self, e: sp.Expr, x: sp.Symbol) -> list[tuple[sp.Expr, list[sp.Basic]]] | None:
         """Real roots with the conditions for them; None where they have no closed form."""
@@ -497,9 +497,9 @@ class _Search:
         if any(e.atoms(sp.Symbol) - set(names) for e in case.left):
             raise SymdynError(f"{problem}; pass numbers for all parameters with values=..., fix some coordinates, or use "
                               "module.equilibria()")
-        found = self._by_resultants(case)
-        if found is not None:
-            return found
+        result = self._by_resultants(case)
+        if result is not None:
+            return result
         circles = [s**2 + c**2 - 1 for s, c in self.pairs.values() if s in names or c in names]
         basis = sp.groebner([*case.left, *circles], *names, order="lex")
         if basis.exprs == [1]:
@@ -538,7 +538,7 @@ class _Search:
                ) -> list[dict[sp.Symbol, sp.Expr]] | None:
         """Sines and cosines that close the loop and balance it; None where the loop leaves an angle open."""
         s, c = linear.gens
-        found = []
+        result = []
         for x in cosines:
             for y in dict.fromkeys([sp.sqrt(1 - x**2), -sp.sqrt(1 - x**2)]):
                 a, b, d = (linear.coeff_monomial(k).subs(dict(zip(first, (y, x), strict=True))) for k in (s, c, 1))
@@ -555,8 +555,8 @@ class _Search:
                 for w in dict.fromkeys([sp.sqrt(inside), -sp.sqrt(inside)]):
                     point = {**dict(zip(first, (y, x), strict=True)), s: (b * w - a * d) / size, c: (-a * w - b * d) / size}
                     if _small(balance.subs({letter: _digits(e) for letter, e in point.items()})):
-                        found.append(point)
-        return found
+                        result.append(point)
+        return result
 
     def _balanced(self, case: _Case, first: int, second: int, points: Sequence[dict[sp.Symbol, sp.Expr]], matrix: sp.Matrix,
                   right: sp.Matrix) -> list[_Case] | None:
@@ -626,26 +626,26 @@ class _Search:
             constant = sp.Add(*[_exact(f) * sp.Mul(*[self.writer.angles.node(n) for n in term]) for term, f in base.items()
                                 if not set(term) & self.unknown_leaves])
             right.append({**angles, **loose, **roots}[k] - constant)
-        found = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))
+        result = dict(zip(self.turning, sp.Matrix(rows).LUsolve(sp.Matrix(right)), strict=True))
         if not loose:
-            return {q: _whole(value).xreplace(back) for q, value in found.items()}, {}
-        found = {q: value.xreplace(back) for q, value in found.items()}
+            return {q: _whole(value).xreplace(back) for q, value in result.items()}, {}
+        result = {q: value.xreplace(back) for q, value in result.items()}
         unknown, letters = list(loose.values()), {s for k in loose for s in self.pairs[k]}
         leading: list[sp.Symbol] = []
-        for q, value in found.items():
-            slopes = sp.Matrix([[found[x].coeff(d) for d in unknown] for x in (*leading, q)])
+        for q, value in result.items():
+            slopes = sp.Matrix([[result[x].coeff(d) for d in unknown] for x in (*leading, q)])
             if not value.free_symbols & letters and slopes.rank() == len(leading) + 1:
                 leading.append(q)
         if len(leading) < len(unknown):
             raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but at some of them "
-                              f"{', '.join(str(q) for q in found)} depend on each other; fix some of them, or use "
+                              f"{', '.join(str(q) for q in result)} depend on each other; fix some of them, or use "
                               "module.equilibria()")
-        slopes = sp.Matrix([[found[q].coeff(d) for d in unknown] for q in leading])
+        slopes = sp.Matrix([[result[q].coeff(d) for d in unknown] for q in leading])
         at_zero = dict.fromkeys(unknown, sp.S.Zero)
-        solved = dict(zip(unknown, slopes.LUsolve(sp.Matrix([q - found[q].subs(at_zero) for q in leading])), strict=True))
+        solved = dict(zip(unknown, slopes.LUsolve(sp.Matrix([q - result[q].subs(at_zero) for q in leading])), strict=True))
         known = {letter: function(sp.expand(solved[d])) for k, d in loose.items()
                  for letter, function in zip(self.pairs[k], (sp.sin, sp.cos), strict=True)}
-        return {q: _whole(sp.expand(value.subs(solved)).subs(known)) for q, value in found.items() if q not in leading}, known
+        return {q: _whole(sp.expand(value.subs(solved)).subs(known)) for q, value in result.items() if q not in leading}, known
 
 
 def _digits(e: sp.Expr) -> sp.Expr:

@@ -93,8 +93,8 @@ class Mechanics:
     def at(self, entries: Any, values: Mapping[Node, Any]) -> np.ndarray:
         """The entries with leaves replaced by numbers or nodes."""
         array = np.asarray(entries, dtype=object)
-        found = vector(*substitute(tuple(array.ravel()), values, self.recorder))
-        return found.reshape(array.shape)
+        result = vector(*substitute(tuple(array.ravel()), values, self.recorder))
+        return result.reshape(array.shape)
 
     # -- energies
 
@@ -188,12 +188,12 @@ class Mechanics:
         slopes = np.zeros((n, n, n), dtype=object)
         for k, q in enumerate(self.q):
             slopes[:, :, k] = vector(*self.by(M.ravel(), q)).reshape(n, n)
-        found = np.zeros((n, n, n), dtype=object)
+        result = np.zeros((n, n, n), dtype=object)
         for i in range(n):
             for j in range(n):
                 for k in range(j, n):
-                    found[i, j, k] = found[i, k, j] = (slopes[i, j, k] + slopes[i, k, j] - slopes[j, k, i]) / 2
-        return found.reshape(n, n * n)
+                    result[i, j, k] = result[i, k, j] = (slopes[i, j, k] + slopes[i, k, j] - slopes[j, k, i]) / 2
+        return result.reshape(n, n * n)
 
     def explicit_rates(self) -> np.ndarray:
         """x_dot with accelerations by Cramer's rule, (n_q + n_u + n_z,). Raises SymdynError under constraints, where loads depend

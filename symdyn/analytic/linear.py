@@ -131,23 +131,23 @@ class Linearized:
                               "coordinates") from None
 
     def _shortest(self, entries: list[Any]) -> list[sp.Expr]:
-        found = written(entries, self.symbols, bound=BOUND)
+        result = written(entries, self.symbols, bound=BOUND)
         if any(value.has(sp.acos, sp.asin, sp.atan, sp.atan2) for value in self.about.values()):
             # What became of sines of these angles is combined.
-            nodes, symbols = recorded([sp.expand_trig(e) for e in found])
-            found = written(nodes, symbols, bound=BOUND)
-        return found
+            nodes, symbols = recorded([sp.expand_trig(e) for e in result])
+            result = written(nodes, symbols, bound=BOUND)
+        return result
 
     @property
     def conditions(self) -> tuple[sp.Eq, ...]:
         """Equations that must hold."""
         if "conditions" not in self._written:
-            found = [e for e in self.write(self.nodes["conditions"]) if e != 0 and not _is_rounding(e)]
-            never = [e for e in found if e.is_number]
+            result = [e for e in self.write(self.nodes["conditions"]) if e != 0 and not _is_rounding(e)]
+            never = [e for e in result if e.is_number]
             if never:
                 raise SymdynError(f"{self.name}: the state is no equilibrium: {shown(never[0])} would have to be zero; "
                                   "take one of eq.equilibria() or module.equilibria()")
-            self._written["conditions"] = tuple(sp.Eq(e, 0, evaluate=False) for e in dict.fromkeys(found))
+            self._written["conditions"] = tuple(sp.Eq(e, 0, evaluate=False) for e in dict.fromkeys(result))
         return self._written["conditions"]
 
     @cached_property
@@ -352,14 +352,14 @@ class State:
     def indices(self, names: Any, what: str) -> list[int]:
         """Indices of speeds, by symbol or name of these or of coordinates; what: the argument's name in errors."""
         s = self.equations.symbols
-        found = [name_of(h) for h in (names if isinstance(names, (list, tuple, set, sp.MatrixBase)) else [names])]
+        result = [name_of(h) for h in (names if isinstance(names, (list, tuple, set, sp.MatrixBase)) else [names])]
         known = {u.name: k for k, u in enumerate(s.speeds)}
         if self.m.plain:
             known |= {q.name: k for k, q in enumerate(s.coordinates)}
-        wrong = [n for n in found if n not in known]
+        wrong = [n for n in result if n not in known]
         if wrong:
             raise ArgumentError(f"{self.equations.name}: {what} is {', '.join(wrong)}; it takes {', '.join(known)}")
-        return sorted({known[n] for n in found})
+        return sorted({known[n] for n in result})
 
 
 class _Linearization:

@@ -52,7 +52,7 @@ def determinant(rows: Any, add: Callable[[Any, Any], Any] = lambda a, b: a + b,
 
 def blocks(matrix: np.ndarray) -> list[list[int]]:
     """Indices that entries which are not zero connect, group by group, of a square matrix."""
-    left, found = list(range(len(matrix))), []
+    left, result = list(range(len(matrix))), []
     while left:
         group, new = [left[0]], [left[0]]
         while new:
@@ -60,9 +60,9 @@ def blocks(matrix: np.ndarray) -> list[list[int]]:
             more = [j for j in left if j not in group and not (is_zero(matrix[k, j]) and is_zero(matrix[j, k]))]
             group += more
             new += more
-        found.append(sorted(group))
+        result.append(sorted(group))
         left = [k for k in left if k not in group]
-    return found
+    return result
 
 
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -80,8 +80,8 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
             own = columns[block, j]
             if all(map(is_zero, own)):
                 continue
-            for k, place in enumerate(block):
+            for k, index in enumerate(block):
                 replaced = rows.copy()
                 replaced[:, k] = own
-                result[place, j] = determinant(replaced) / below
+                result[index, j] = determinant(replaced) / below
     return result.reshape(right.shape)

@@ -88,8 +88,8 @@ def reduced(equations: Equations, A: np.ndarray, A_q: np.ndarray, N: np.ndarray,
         Z_u[k, j] = 1
     if d:
         moved = A_q @ N @ Z_v
-        found = -solve(A[:, d], np.hstack([A[:, i_u], moved]))
-        Z_u[d], Z_w[d] = found[:, :len(i_u)], found[:, len(i_u):]
+        result = -solve(A[:, d], np.hstack([A[:, i_u], moved]))
+        Z_u[d], Z_w[d] = result[:, :len(i_u)], result[:, len(i_u):]
     return Reduced(tuple(i_v), tuple(i_u), tuple(d), Z_v, Z_u, Z_w, Z_u[i_v], Z_w[i_v])
 
 
@@ -106,14 +106,14 @@ class _Choice:
     def more(self, rows: Sequence[int], chosen: Sequence[int], free: Sequence[int]) -> list[int]:
         """With those chosen before, speeds whose columns in these rows are independent for parameters in general: the last ones
         first, those that are wanted as independent last."""
-        numbers, found = self.numbers[list(rows)], list(chosen)
+        numbers, result = self.numbers[list(rows)], list(chosen)
         for k in sorted(free, key=lambda k: (k in self.wanted, -k)):
-            if k not in found and len(found) < len(numbers) and (
-                    np.linalg.matrix_rank(numbers[:, [*found, k]], tol=RANK) > len(found)):
-                found.append(k)
-        if len(found) < len(numbers):
+            if k not in result and len(result) < len(numbers) and (
+                    np.linalg.matrix_rank(numbers[:, [*result, k]], tol=RANK) > len(result)):
+                result.append(k)
+        if len(result) < len(numbers):
             held = " in the speeds that are not held" if len(free) < numbers.shape[1] else ""
-            raise SymdynError(f"{self.name}: its {len(numbers)} constraints have rank {len(found)}{held} at the state, so that "
+            raise SymdynError(f"{self.name}: its {len(numbers)} constraints have rank {len(result)}{held} at the state, so that "
                               "the multipliers are not unique; leave out those that others imply (system.diagnose() names them), "
                               "or use module.linearize(at)")
-        return sorted(found)
+        return sorted(result)

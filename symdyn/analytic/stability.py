@@ -103,10 +103,10 @@ class Characteristic:
             # Without gyroscopic and circulatory terms all s^2 are real.
             linear = self.linear
             real = linear.holonomic and linear.C.is_zero_matrix and linear.K.is_symmetric() and linear.M.is_symmetric()
-            kind, found = "neutral", list(left[:-1:2]) if real else _negative_and_real(left[::2])
+            kind, result = "neutral", list(left[:-1:2]) if real else _negative_and_real(left[::2])
         else:
-            kind, found = "asymptotic", _lienard_chipart(left[::-1])
-        return Stability(_inequalities(self.linear.write(found)), kind, zero, self.linear.conditions)
+            kind, result = "asymptotic", _lienard_chipart(left[::-1])
+        return Stability(_inequalities(self.linear.write(result)), kind, zero, self.linear.conditions)
 
 
 def characteristic(linear: Linearized) -> Characteristic:
@@ -165,10 +165,10 @@ def _lienard_chipart(a: Sequence[Any]) -> list[Any]:
 
 def _inequalities(values: Sequence[sp.Expr]) -> tuple[sp.Rel, ...]:
     """Each above zero, without factors that are positive, and without those that always hold."""
-    found: dict[Any, None] = {}
+    result: dict[Any, None] = {}
     for value in values:
         factors = [f for f in sp.Mul.make_args(value) if not f.is_positive]
         kept = sp.Mul(*[f.base if f.is_Pow and f.exp.is_odd and f.exp.is_positive else f for f in factors])
         if factors:  # what holds never is shown as it is
-            found.setdefault(sp.StrictGreaterThan(value if kept.is_negative else kept, 0, evaluate=False))
-    return tuple(found)
+            result.setdefault(sp.StrictGreaterThan(value if kept.is_negative else kept, 0, evaluate=False))
+    return tuple(result)

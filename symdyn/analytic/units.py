@@ -104,8 +104,8 @@ def check_units(equations: Equations) -> UnitReport:
     units_of: dict[str, Any] = {}
     for name, value in quantities.items():
         words = ENERGIES if name in ("T", "V") else {}
-        found = [text(dimensions.of(e)) if isinstance(e, Node) else "" for e in value.ravel()]
-        array = np.array([words.get(unit, unit) for unit in found], dtype=object)
+        result = [text(dimensions.of(e)) if isinstance(e, Node) else "" for e in value.ravel()]
+        array = np.array([words.get(unit, unit) for unit in result], dtype=object)
         units_of[name] = array.reshape(value.shape).tolist()
     used = {symbol: leaf for leaf, symbol in printed.items() if leaf in dimensions}
     inferred = {symbol: text(dimensions.of(leaf)) for symbol, leaf in used.items() if units.get(symbol) is None}

@@ -13,7 +13,7 @@ from symdyn.backend.program import Program, build
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape
 
-_WRITTEN_OTHERWISE = ("add", "sub", "mul", "div", "neg", "guard", "call", "item", "pi")
+_WITHOUT_FUNCTION = ("add", "sub", "mul", "div", "neg", "guard", "call", "item", "pi")
 _NUMBERS = {"pow": 2, "atan2": 2, "min": 2, "max": 2, "and": 2, "or": 2, "select": 3}
 _COMPARISONS = {"lt": "a < b", "le": "a <= b", "gt": "a > b", "ge": "a >= b", "eq": "a == b", "ne": "a != b"}
 _PREFIX = "symdyn_each_"
@@ -37,7 +37,8 @@ class Batch:
 
 
 def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str, Tape], titles: Mapping[str, str],
-             places: Mapping[str, tuple[str, int]], otherwise: Mapping[str, Tape], names: Sequence[str] = ("rhs",)) -> Batch:
+             places: Mapping[str, tuple[str, int]], singular_fallback: Mapping[str, Tape],
+             names: Sequence[str] = ("rhs",)) -> Batch:
     """Functions of a program on vectors.
 
     folder   of the backend; the dialect of vectors is in `batch` in it
@@ -47,7 +48,7 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     dialect = read_dialect(folder / "batch")
     dialect = replace(dialect, operations={
         op: f"{f.name}({', '.join(f'VECTOR({{{k}}})' for k in range(len(f.arguments)))})" for op, f in available.items()})
-    built = build(dialect, tapes, titles, places, otherwise=otherwise, like=program).functions
+    built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program).functions
     functions = {f.name: f.regular or f for f in built if f.name in names}
     text = "\n".join(line for function in functions.values() for part in (function.parts or (function,)) for lines in
                      (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
@@ -58,7 +59,7 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
 def _lane_functions(scalar: Dialect) -> dict[str, LaneFunction]:
     result = {}
     for op in OPERATIONS:
-        if op in _WRITTEN_OTHERWISE:
+        if op in _WITHOUT_FUNCTION:
             continue
         letters = ("a", "b", "c")[:2 if op in _COMPARISONS else _NUMBERS.get(op, 1)]
         text = scalar.operations.get(op) or _COMPARISONS.get(op) or f"{op}({', '.join(letters)})"

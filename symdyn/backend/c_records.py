@@ -29,11 +29,11 @@ def fields_of(file: str) -> list[tuple[str, Any]]:
 
     Raises SymdynError for a member whose type has no mirror.
     """
-    found = _RECORD.search(_text(file))
-    if found is None:
+    result = _RECORD.search(_text(file))
+    if result is None:
         raise SymdynError(f"c/{file} declares no record; declare one with typedef struct")
     fields: list[tuple[str, Any]] = []
-    for member in filter(None, (m.strip() for m in found["body"].split(";"))):
+    for member in filter(None, (m.strip() for m in result["body"].split(";"))):
         function, members = _FUNCTION.fullmatch(member), _MEMBERS.fullmatch(member)
         if function:
             kinds = [_argument(a.strip()) for a in function["arguments"].split(",")]

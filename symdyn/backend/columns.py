@@ -164,11 +164,11 @@ def _counted(node: Node) -> bool:
 
 
 def _together(needs: Mapping[Node, int], node: Node) -> int:
-    found = 0
+    result = 0
     for a in node.args:
         if isinstance(a, Node):
-            found |= needs.get(a, 0)
-    return found
+            result |= needs.get(a, 0)
+    return result
 
 
 def seeds_of(group: Group) -> dict[str, tuple[str, int]]:

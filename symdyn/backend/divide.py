@@ -19,7 +19,7 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
     that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
     others, `longest` by each.
     """
-    stretches = stretches_of(products_beside_their_sums(body, entries), longest)
+    stretches = stretches_of(products_next_to_their_sums(body, entries), longest)
     begin = len(stretches) - 1
     if len(entries) > longest:
         begin += 1
@@ -32,8 +32,8 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
                 core = unsigned(a)
                 if where.get(core, k) != k:
                     last_use[core] = k
-    for place, e in enumerate(entries):
-        core, reader = unsigned(e), begin + place // longest
+    for index, e in enumerate(entries):
+        core, reader = unsigned(e), begin + index // longest
         if where.get(core, reader) != reader:
             last_use[core] = reader
     over: dict[int, list[Node]] = {}
@@ -55,7 +55,7 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
     return result, slots, count
 
 
-def products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
+def products_next_to_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
     """The steps with each product that only one sum needs just before that sum, so that both become one operation."""
     alone: dict[Node, bool] = {}
     for node in body:

@@ -82,25 +82,25 @@ class Rows:
         for e in entries:  # random weights, so that effects on two entries do not cancel
             if isinstance(e, Node):
                 weight[e] = weight.get(e, 0.0) + stream.uniform(0.5, 1.5) * stream.choice((1, -1)) * np.ones(self.n)
-        found: dict[Any, np.ndarray] = {}
+        result: dict[Any, np.ndarray] = {}
         with np.errstate(all="ignore"):
             for node in reversed(self.tape.steps):
                 if node not in weight or node.op == "leaf":
                     continue
                 self._back(node, weight)
-                self._note(node, weight[node], scale, found)
-        return {key: value & self.defined for key, value in found.items()}
+                self._note(node, weight[node], scale, result)
+        return {key: value & self.defined for key, value in result.items()}
 
-    def _note(self, node: Node, weight: Any, scale: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+    def _note(self, node: Node, weight: Any, scale: np.ndarray, result: dict[Any, np.ndarray]) -> None:
         if node.op in PASSED_ON:
             return
         if node.op == "select":
             condition = np.broadcast_to(np.asarray(self.number(node.args[0]), dtype=bool), (self.n,))
             matters = np.abs(weight) > 0
-            found[node, True], found[node, False] = matters & condition, matters & ~condition
+            result[node, True], result[node, False] = matters & condition, matters & ~condition
             return
         value = self.number(node)
-        found[node] = _numbers(np.abs(weight * value)) * CHANGE > SHOWS * scale
+        result[node] = _numbers(np.abs(weight * value)) * CHANGE > SHOWS * scale
 
     def _back(self, node: Node, weight: dict[Node, Any]) -> None:
         """Pass the weight of a step on to its arguments."""
@@ -134,14 +134,14 @@ def _numbers(values: Any) -> np.ndarray:
 
 def statements(tapes: Sequence[Tape]) -> set[Any]:
     """What there is to exercise in tapes: every statement on which a result depends, of a choice both branches."""
-    found: set[Any] = set()
+    result: set[Any] = set()
     for tape in tapes:
         for node in _valued(tape):
             if node.op == "select":
-                found |= {(node, True), (node, False)}
+                result |= {(node, True), (node, False)}
             elif node.op not in PASSED_ON and OPERATIONS[node.op].kind != "compare":
-                found.add(node)
-    return found
+                result.add(node)
+    return result
 
 
 def deciding(tapes: Sequence[Tape]) -> set[Node]:
@@ -151,16 +151,16 @@ def deciding(tapes: Sequence[Tape]) -> set[Node]:
 
 def _valued(tape: Tape) -> set[Node]:
     """The steps that results are computed from."""
-    found: set[Node] = set()
+    result: set[Node] = set()
     waiting = [e for output in tape.outputs.values() for e in output.entries if isinstance(e, Node)]
     while waiting:
         node = waiting.pop()
-        if node in found:
+        if node in result:
             continue
-        found.add(node)
+        result.add(node)
         values = node.args[:1] if node.op in ("guard", "item") else node.args[1:] if node.op == "select" else node.args
         waiting += [a for a in values if isinstance(a, Node)]
-    return found
+    return result
 
 
 def singular_states(tape: Tape, values: Mapping[str, np.ndarray], n: int) -> Iterator[dict[str, np.ndarray]]:

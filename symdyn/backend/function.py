@@ -64,7 +64,7 @@ class Function:
     parts: tuple[Part, ...] = ()
     n_w: int = 0
     regular: Function | None = None
-    otherwise: Function | None = None
+    singular_fallback: Function | None = None
     inlined: frozenset[Node] = frozenset()
     values: Function | None = None
     along: tuple[Along, ...] = ()

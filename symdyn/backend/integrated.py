@@ -80,13 +80,13 @@ class Shape:
     @property
     def resets(self) -> list[int]:
         """The entries of x that events reset, of one event after the other."""
-        return [place for event in self.events for place in event.reset]
+        return [index for event in self.events for index in event.reset]
 
     @property
     def held(self) -> list[int]:
         """The entries of [q; u] that events reset and that stay when constraints are met, in order."""
         middle = self.sizes["q"] + self.sizes["u"]
-        return sorted({place for place in self.resets if place < middle}) if self.n_rows and self.directed else []
+        return sorted({index for index in self.resets if index < middle}) if self.n_rows and self.directed else []
 
 
 def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,

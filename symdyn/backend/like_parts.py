@@ -44,7 +44,7 @@ def find_loops(kinds: np.ndarray, begins: Sequence[int] | np.ndarray) -> list[Lo
     kinds    of all steps, as integers: steps of one kind do the same with arguments of the same kinds
     begins   steps where a stretch begins rather than elsewhere, ascending: where another heading does
     """
-    found: list[Loop] = []
+    result: list[Loop] = []
     begins = np.asarray(begins, dtype=int)
     waiting = [(0, len(kinds))]
     since = _since(kinds)
@@ -52,9 +52,9 @@ def find_loops(kinds: np.ndarray, begins: Sequence[int] | np.ndarray) -> list[Lo
         first, end = waiting.pop()
         loop = _best(kinds, first, end, _lengths(since, first, end), begins)
         if loop is not None:
-            found.append(loop)
+            result.append(loop)
             waiting += [(first, loop.begin), (loop.end, end)]
-    return sorted(found, key=lambda loop: loop.begin)
+    return sorted(result, key=lambda loop: loop.begin)
 
 
 def _since(kinds: np.ndarray) -> np.ndarray:

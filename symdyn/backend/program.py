@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from symdyn.given import Rolling
 
 # Ends of the names of the two ways of a function that is tried in one way first.
-REGULAR, OTHERWISE = "regular", "singular"
+REGULAR, SINGULAR_FALLBACK = "regular", "singular"
 # Derivatives along a direction of so many operations at most are compiled into the function that calls them: measured, that
 # takes 3 to 8 % less time in a pendulum of five links, and more in longer ones.
 INLINE = 200
@@ -42,7 +42,7 @@ class Program:
     """All functions with their shared prologue.
 
     reasons   what the return codes 1, 2, ... mean
-    kernels   numeric algorithms that are called: name -> largest size of each kind
+    intrinsics   numeric algorithms that are called: name -> largest size of each kind
     one_size  those of them that are called with one size only
     user_functions   functions of the user that are called, by name
     n_c       number of constants that the prologue computes
@@ -52,13 +52,13 @@ class Program:
     prologue: Function
     n_c: int
     reasons: tuple[str, ...]
-    kernels: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    intrinsics: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     user_functions: tuple[UserFunction, ...] = ()
     one_size: frozenset[str] = frozenset()
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
-          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None, like: Program | None = None,
+          reasons: Sequence[str] = (), singular_fallback: Mapping[str, Tape] | None = None, like: Program | None = None,
           columns: Mapping[str, Columns] | None = None, vectors: Dialect | None = None, rolled: Rolling = "auto") -> Program:
     """Write every tape (function name -> tape with one output) in the dialect.
 
@@ -69,19 +69,19 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     rolled      whether what functions repeat becomes loops: "auto" where that saves LEAST_SAVED statements, True wherever it can
                 be; where `like` is given, in those functions that it has loops in
     """
-    otherwise, columns = otherwise or {}, columns or {}
+    singular_fallback, columns = singular_fallback or {}, columns or {}
     first = next(iter(tapes.values()))
     outputs = {name: next(iter(tape.outputs.values())) for name, tape in
-               [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]}
+               [*tapes.items(), *((f"{name}_{SINGULAR_FALLBACK}", tape) for name, tape in singular_fallback.items())]}
     whole = first if first.outputs == outputs else Tape(first.recorder, outputs)
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
         [*reasons, *checks_of(whole, whole.steps).values()]))}
-    late = _late(whole, tapes, otherwise)
+    late = _late(whole, tapes, singular_fallback)
     used = set(cores_of([a for n in (*whole.running, *late) for a in n.args]
                       + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    inlined = {w.name: w.inlined for f in like.functions for w in (f, f.regular, f.otherwise) if w} if like else {}
+    inlined = {w.name: w.inlined for f in like.functions for w in (f, f.regular, f.singular_fallback) if w} if like else {}
     write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late, inlined=inlined)
     rolls = _rolls(dialect, rolled, late, like)
 
@@ -93,10 +93,10 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
 
     functions = tuple(
         _either(name, titles[name], written(name, tape, f"{name}_{REGULAR}"),
-                write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name], rolls=rolls)) if name in otherwise
-        else written(name, tape, name) for name, tape in tapes.items())
+                write(singular_fallback[name], name=f"{name}_{SINGULAR_FALLBACK}", title=titles[name], rolls=rolls))
+        if name in singular_fallback else written(name, tape, name) for name, tape in tapes.items())
     prologue = _prologue(Writer(dialect, whole, places, {}, codes, late), constants, rolls, functions)
-    return Program(functions, prologue, len(constants), tuple(codes), *_kernels(whole))
+    return Program(functions, prologue, len(constants), tuple(codes), *_intrinsics(whole))
 
 
 def _rolls(dialect: Dialect, rolled: Rolling, late: set[Node], like: Program | None) -> Rolls:
@@ -107,7 +107,7 @@ def _rolls(dialect: Dialect, rolled: Rolling, late: set[Node], like: Program | N
     if dialect.loops is None or dialect.parts is None or rolled is False or late:
         return no_loops
     if like is not None:
-        with_loops = {w.name for f in like.functions for w in (f, f.regular, f.otherwise) if w is not None and w.loops}
+        with_loops = {w.name for f in like.functions for w in (f, f.regular, f.singular_fallback) if w is not None and w.loops}
         return lambda name, steps: 1 if name in with_loops else None
     least = LEAST_SAVED if rolled == "auto" else 1
     return lambda name, steps: least if steps > least else None
@@ -116,7 +116,7 @@ def _rolls(dialect: Dialect, rolled: Rolling, late: set[Node], like: Program | N
 def _prologue(writer: Writer, constants: Mapping[Node, int], rolls: Rolls, functions: Sequence[Function]) -> Function:
     """The function that computes the constants, with loops for what it repeats, at least where another one has loops."""
     tape = writer.tape
-    rolled = any(w.loops for f in functions for w in (f, f.regular, f.otherwise) if w is not None)
+    rolled = any(w.loops for f in functions for w in (f, f.regular, f.singular_fallback) if w is not None)
     repeats = 1 if rolled else rolls("prologue", len(tape.prologue))
     if repeats is not None:
         one_by_one = replace(writer.dialect, sincos=None)
@@ -127,14 +127,14 @@ def _prologue(writer: Writer, constants: Mapping[Node, int], rolls: Rolls, funct
     return writer.prologue(constants)
 
 
-def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
+def _late(whole: Tape, tapes: Mapping[str, Tape], singular_fallback: Mapping[str, Tape]) -> set[Node]:
     """Steps that depend on parameters only, and yet wait until a function runs: they divide by what may vanish, and then there
     is another way to compute the function."""
-    if not otherwise:
+    if not singular_fallback:
         return set()
-    either = [set(checks_of(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
+    either = [set(checks_of(tape, tape.prologue)) for name, tape in tapes.items() if name in singular_fallback]
     always = [set(checks_of(tape, tape.prologue)) for tape in
-              [*[tape for name, tape in tapes.items() if name not in otherwise], *otherwise.values()]]
+              [*[tape for name, tape in tapes.items() if name not in singular_fallback], *singular_fallback.values()]]
     demanded = set().union(*either).difference(*always)
     late: set[Node] = set()
     for node in whole.prologue:
@@ -144,21 +144,21 @@ def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape])
     return late
 
 
-def _either(name: str, title: str, regular: Function, otherwise: Function) -> Function:
+def _either(name: str, title: str, regular: Function, singular_fallback: Function) -> Function:
     """A function that is tried in one way first."""
-    groups = {*regular.arguments, *otherwise.arguments}
+    groups = {*regular.arguments, *singular_fallback.arguments}
     return Function(name, title, regular.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), regular.operations,
-                    regular.longest_chain, regular=regular, otherwise=otherwise)
+                    regular.longest_chain, regular=regular, singular_fallback=singular_fallback)
 
 
-def _kernels(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str]]:
+def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str]]:
     """Numeric algorithms with their largest sizes, functions of the user, and the algorithms that are called with one size."""
     sizes: dict[str, set[tuple[int, ...]]] = {}
     for node in tape.steps:
         if node.op == "call" and not isinstance(node.args[0], UserFunction):
             sizes.setdefault(node.args[0].name, set()).add(tuple(node.args[0].sizes))
-    largest = {name: tuple(map(max, zip(*found, strict=True))) for name, found in sorted(sizes.items())}
-    return largest, called(tape), frozenset(name for name, found in sizes.items() if len(found) == 1)
+    largest = {name: tuple(map(max, zip(*result, strict=True))) for name, result in sorted(sizes.items())}
+    return largest, called(tape), frozenset(name for name, result in sizes.items() if len(result) == 1)
 
 
 def _columns(columns: Columns, name: str, title: str, write: Callable[..., Function], write_vectors: Callable[..., Function],
@@ -223,7 +223,7 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
                         tape.longest_chain(), inlined=frozenset(writer.printer.inline))
     parts: list[Part] = []
     earlier: dict[Node, tuple[str, int]] = {}
-    found: set[Node] = set()
+    result: set[Node] = set()
     longest = dialect.parts.longest
     stretches, slots, n_w = divide(body, output.entries, longest)
     storing = max(1, -(-len(output.entries) // longest))
@@ -236,7 +236,7 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
             here = [output.entries[i] for i in ends]
             parts.append(writer.part(stretch, here, writer.results_of(output.entries, ends), checks))
         earlier |= {node: ("w", slots[node]) for node in kept}
-        found |= writer.printer.inline
+        result |= writer.printer.inline
     groups = {g for part in parts for g in part.arguments}
     return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), operations,
-                    tape.longest_chain(), tuple(parts), n_w, inlined=frozenset(found))
+                    tape.longest_chain(), tuple(parts), n_w, inlined=frozenset(result))

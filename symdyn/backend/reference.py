@@ -82,7 +82,7 @@ class Reference:
 
 
 def make_reference(tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]], defaults: Mapping[str, float],
-                   calls: Mapping[str, str], otherwise: Mapping[str, Tape] | None = None, samples: int = 2,
+                   calls: Mapping[str, str], singular_fallback: Mapping[str, Tape] | None = None, samples: int = 2,
                    seed: int = 1) -> Reference:
     """Evaluate every tape at random states in [-1, 1], and those tapes of which some statement has no effect there at further
     states that exercise it.
@@ -98,7 +98,7 @@ def make_reference(tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]
     function that is defined at none of them is left out.
     """
     stream = random.Random(seed)
-    whole = {name: (tape, (otherwise or {}).get(name)) for name, tape in tapes.items()}
+    whole = {name: (tape, (singular_fallback or {}).get(name)) for name, tape in tapes.items()}
     drawn = []
     for attempt in range(_ATTEMPTS):
         usual = {name: defaults.get(name, round(stream.uniform(0.5, 1.5), 6)) for name in groups["p"]}
@@ -216,11 +216,11 @@ class _Search:
         holds = np.ones(n, dtype=bool)
         for node in rows.checked:
             holds &= rows.margin(node) > 0
-        found = {key: value & holds for key, value in rows.exercised().items()}
+        result = {key: value & holds for key, value in rows.exercised().items()}
         if singular is not None:
             there = {key: value & ~holds for key, value in Rows(singular, points, n).exercised().items()}
-            found |= {key: value | found.get(key, np.zeros(n, dtype=bool)) for key, value in there.items()}
-        return [{key for key, value in found.items() if value[k]} for k in range(n)]
+            result |= {key: value | result.get(key, np.zeros(n, dtype=bool)) for key, value in there.items()}
+        return [{key for key, value in result.items() if value[k]} for k in range(n)]
 
     def _candidates(self) -> dict[str, np.ndarray]:
         """Random points of several sizes with varied parameters, and points where a divisor with a singular fallback vanishes."""
@@ -252,7 +252,8 @@ def result_at(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> Re
     if not all(hasattr(e, "_mpf_") and mpmath.isfinite(e) for e in [*exact, *positive]) or any(e <= 0 for e in positive):
         return None
     scale = max((abs(float(e)) for e in exact), default=0.0) or 1.0
-    lost = max((abs(float(a - b)) / scale for found in (double, floats) for a, b in zip(exact, found, strict=True)), default=0.0)
+    lost = max((abs(float(a - b)) / scale for result in (double, floats) for a, b in zip(exact, result, strict=True)),
+               default=0.0)
     if not lost < 1.0:
         return None
     # A power of ten, since the digits of what is lost depend on the processor, and written modules must not.

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.backend.dialect import Dialect, identifier
-from symdyn.backend.divide import products_beside_their_sums
+from symdyn.backend.divide import products_next_to_their_sums
 from symdyn.backend.function import ARGUMENTS, Function, Part, Section
 from symdyn.backend.like_parts import Loop, find_loops
 from symdyn.backend.writer import Writer, cores_of, taken_at_once
@@ -158,7 +158,7 @@ class Rolled:
             here = stores.setdefault(core, []) if isinstance(core, Node) and core in computed else first
             here.append(_Store("store", k, entry))
         needed = computed.intersection(reachable(self.angles))
-        ordered = [n for n in products_beside_their_sums(self.body, self.entries) if n in computed]
+        ordered = [n for n in products_next_to_their_sums(self.body, self.entries) if n in computed]
 
         def stored(nodes: Sequence[Node]) -> Iterator[_Step]:
             for node in nodes:
@@ -177,7 +177,7 @@ class Rolled:
         order = {angle: k for k, angle in enumerate(self.angles)}
         n = len(self.angles)
         sines = {node: (1 + (node.op == "cos")) * n + order[node.args[0]] for node in self.at_once}
-        place = [-1] * len(steps)
+        index = [-1] * len(steps)
         values = [a for step in steps for a in step.args]
         minus = np.array([isinstance(a, Node) and a.op == "neg" for a in values], dtype=np.int64)
         cores = [a.args[0] if isinstance(a, Node) and a.op == "neg" else a for a in values]
@@ -195,9 +195,9 @@ class Rolled:
                 group, at = self._group(core, sines)
                 self.read.append(core)
                 self.groups.append(group)
-                place.append(at)
+                index.append(at)
             read[k] = number[key]
-        self.place = np.array(place, dtype=np.int64)
+        self.place = np.array(index, dtype=np.int64)
 
         together = ~alone[reader]
         where = reader[together], (np.arange(len(values)) - np.repeat(np.cumsum(sizes) - sizes, sizes))[together]

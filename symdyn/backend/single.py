@@ -16,4 +16,4 @@ def in_single(text: str) -> str:
     >>> in_single("const double a = 0.5*b + 1e-3*c[12];  // 0.5 of it")
     'const float a = 0.5f*b + 1e-3f*c[12];  // 0.5 of it'
     """
-    return _TOKENS.sub(lambda found: found[0] if found["kept"] else "float" if found["word"] else f"{found['number']}f", text)
+    return _TOKENS.sub(lambda token: token[0] if token["kept"] else "float" if token["word"] else f"{token['number']}f", text)

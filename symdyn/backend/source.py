@@ -37,7 +37,7 @@ from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.folders import templates_folder
 from symdyn.shown import shown
 from symdyn.tape.algorithms import text_of
-from symdyn.tape.kernels import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
+from symdyn.tape.intrinsics import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
 from symdyn.turning import is_angle, turns
 
@@ -85,7 +85,7 @@ class Content:
     outputs: Sequence[tuple[str, tuple[int, ...]]] = ()
     notes: Sequence[str] = ()
     unit_groups: Sequence[Sequence[str]] = ()
-    otherwise: Mapping[str, Tape] = field(default_factory=dict)
+    singular_fallback: Mapping[str, Tape] = field(default_factory=dict)
     events: Sequence[EventRecord] = ()
     event_leaves: Sequence[int] = ()
     columns: int = 0
@@ -158,13 +158,13 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
     vectors = read_dialect(folder / "columns") if content.jacobians else None
-    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.jacobians,
-                    vectors=vectors, rolled=not threads and rolled)
+    program = build(dialect, content.tapes, content.titles, places, singular_fallback=content.singular_fallback,
+                    columns=content.jacobians, vectors=vectors, rolled=not threads and rolled)
     lanes, many = None, None
     if backend == "c":
         shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, places,
-                                       content.otherwise)
+                                       content.singular_fallback)
         lanes = on_vectors() if batch and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
@@ -201,7 +201,8 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
 
 def _check_single(name: str, program: Program) -> None:
     """Raises UnsupportedExpression for algorithms, and functions of the user, whose texts are in double precision."""
-    faults = [f"{kernel} ({_CALLED_BY[kernel]})" for kernel in program.kernels] + [f.signature for f in program.user_functions]
+    faults = [f"{intrinsic} ({_CALLED_BY[intrinsic]})" for intrinsic in program.intrinsics]
+    faults += [f.signature for f in program.user_functions]
     if faults:
         raise UnsupportedExpression(f"{name}: there is no single precision of {', '.join(faults)}, which its right-hand side "
                                     "calls; pass precision='double'")
@@ -274,7 +275,9 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     written = [way for f in program.functions for way in _ways(f)]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
     wanted = standalone and states > 0
-    reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if wanted else None
+    reference = None
+    if wanted:
+        reference = make_reference(content.tapes, groups, content.defaults, calls, content.singular_fallback, states)
     uses = {f.name: f.arguments for f in program.functions}
 
     def signature(f: Function) -> str:
@@ -347,7 +350,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
         "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
-        "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
+        "uses_sincos": "symdyn_sincos(" in text, "intrinsics": program.intrinsics, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "solver_sizes": _solver_sizes(program), "algorithms": _algorithms(program),
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
@@ -360,7 +363,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
 
 def _ways(f: Function) -> list[Function]:
     """A function and those that it calls."""
-    called = [way for way in (f.regular, f.otherwise, f.values) if way is not None] + [a.function for a in f.along]
+    called = [way for way in (f.regular, f.singular_fallback, f.values) if way is not None] + [a.function for a in f.along]
     return [f, *[inner for way in called for inner in _ways(way)]]
 
 
@@ -380,20 +383,21 @@ def _metadata_lines(metadata: Metadata) -> list[tuple[str, str]]:
 def _solver_sizes(program: Program) -> list[tuple[str, str]]:
     """Macros that the solvers in C read: their largest sizes, whether all calls have these, their numbers."""
     result: dict[str, str] = {}
-    for kernel, numbers in (("saddle", {"LOOSE": LOOSE, "MASSLESS": MASSLESS, "ROUNDS": ROUNDS}),
-                            ("multipliers", {"SMOOTHED": SMOOTHED, "ROUNDS": ROUNDS, "CLEANINGS": CLEANINGS})):
-        if f"symdyn_{kernel}" in program.kernels:
-            n, m = program.kernels[f"symdyn_{kernel}"]
-            one_size = f"symdyn_{kernel}" in program.one_size and m > 0
-            result |= {f"SYMDYN_{kernel.upper()}_N": repr(n), f"SYMDYN_{kernel.upper()}_M": repr(max(m, 1)),
-                       f"SYMDYN_{kernel.upper()}_ONE_SIZE": repr(int(one_size)),
+    for intrinsic, numbers in (("saddle", {"LOOSE": LOOSE, "MASSLESS": MASSLESS, "ROUNDS": ROUNDS}),
+                               ("multipliers", {"SMOOTHED": SMOOTHED, "ROUNDS": ROUNDS, "CLEANINGS": CLEANINGS})):
+        if f"symdyn_{intrinsic}" in program.intrinsics:
+            n, m = program.intrinsics[f"symdyn_{intrinsic}"]
+            one_size = f"symdyn_{intrinsic}" in program.one_size and m > 0
+            result |= {f"SYMDYN_{intrinsic.upper()}_N": repr(n), f"SYMDYN_{intrinsic.upper()}_M": repr(max(m, 1)),
+                       f"SYMDYN_{intrinsic.upper()}_ONE_SIZE": repr(int(one_size)),
                        **{f"SYMDYN_{key}": repr(value) for key, value in numbers.items()}}
     return list(result.items())
 
 
 def _algorithms(program: Program) -> list[str]:
     """The texts in Python that numeric algorithms share with the package."""
-    return [text_of(name) for name in dict.fromkeys(name for kernel in program.kernels for name in ("states", _TEXTS[kernel]))]
+    names = dict.fromkeys(name for intrinsic in program.intrinsics for name in ("states", _TEXTS[intrinsic]))
+    return [text_of(name) for name in names]
 
 
 def _shape_text(f: Function) -> str:

@@ -39,14 +39,14 @@ class UserText:
 
 def called(tape: Tape) -> tuple[UserFunction, ...]:
     """Functions that a tape calls, by name. Raises SymdynError for two that differ and have one name."""
-    found: dict[str, UserFunction] = {}
+    result: dict[str, UserFunction] = {}
     for node in tape.steps:
         if node.op == "call" and isinstance(node.args[0], UserFunction):
             function = node.args[0]
-            if found.setdefault(function.label, function) != function:
-                raise SymdynError(f"two functions that differ are called {function.label}: {found[function.label].signature} and "
-                                  f"{function.signature}; give one of them another name")
-    return tuple(function for _, function in sorted(found.items()))
+            if result.setdefault(function.label, function) != function:
+                raise SymdynError(f"two functions that differ are called {function.label}: {result[function.label].signature} "
+                                  f"and {function.signature}; give one of them another name")
+    return tuple(function for _, function in sorted(result.items()))
 
 
 def texts(functions: Sequence[UserFunction], backend: str, name: str) -> list[UserText]:

@@ -158,8 +158,8 @@ class Writer:
         angles = list(dict.fromkeys(n.args[0] for n in nodes))
         lines = way.take.format(n=len(angles), angles=", ".join(map(self.printer.text, angles))).strip().split("\n")
         for node in nodes:
-            place = angles.index(node.args[0]) + self.dialect.first
-            self._assign(node, self._name(node), (way.sin if node.op == "sin" else way.cos).format(k=place), lines)
+            index = angles.index(node.args[0]) + self.dialect.first
+            self._assign(node, self._name(node), (way.sin if node.op == "sin" else way.cos).format(k=index), lines)
         return [Section("sines and cosines", tuple(lines))]
 
     # -- statements
@@ -213,20 +213,21 @@ class Writer:
 
     def _call(self, node: Node) -> list[str]:
         """The statements that call one; its node stands for the array of results."""
-        kernel, *values = node.args
+        intrinsic, *values = node.args
         way = self.dialect.call
-        mine = isinstance(kernel, UserFunction)
+        mine = isinstance(intrinsic, UserFunction)
         if way is None:
-            called = f"function {kernel.signature}" if mine else f"numeric algorithm {kernel.name}"
+            called = f"function {intrinsic.signature}" if mine else f"numeric algorithm {intrinsic.name}"
             raise SymdynError(f"the equations call the {called}, which the backend {self.dialect.name} does not have; "
                               "add [call] to its dialect.toml, and the algorithm to its templates")
         self.n_calls += 1
-        self.text[node] = identifier(f"{kernel.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
+        self.text[node] = identifier(f"{intrinsic.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
         written = [way.argument.format(value=self.printer.text(v)) for v in values]
         arguments = fill(", ".join(written), 116, subsequent_indent="    ", break_long_words=False)
         arguments = arguments.replace("\n", f"{way.continued}\n")
-        return way.take.format(name=self.text[node], function=kernel.name, sizes="".join(f"{size}, " for size in kernel.sizes),
-                               arguments=arguments, n_in=len(values), n_out=kernel.n_out,
+        sizes = "".join(f"{size}, " for size in intrinsic.sizes)
+        return way.take.format(name=self.text[node], function=intrinsic.name, sizes=sizes,
+                               arguments=arguments, n_in=len(values), n_out=intrinsic.n_out,
                                code=self.codes[self.checks[node]]).strip().split("\n")
 
     def _name(self, node: Node) -> str:

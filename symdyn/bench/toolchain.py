@@ -48,12 +48,12 @@ def include_flags(*needed: str) -> list[str]:
     """Options for the headers of pinocchio, boost, eigen, casadi. Raises SymdynError that names a missing one."""
     folders: list[Path] = []
     for what in needed:
-        found = next((f for f in _include_folders() if (f / _HEADERS[what]).is_file()), None)
-        if found is None:
+        result = next((f for f in _include_folders() if (f / _HEADERS[what]).is_file()), None)
+        if result is None:
             raise SymdynError(f"the C++ header {_HEADERS[what]} was found neither next to the Python packages pinocchio and "
                               "casadi, whose wheels bring it (pip install 'symdyn[peers]'), nor in the system; install the "
                               f"headers of {what}")
-        folders.append(found)
+        folders.append(result)
     return [f"-isystem{folder}" for folder in dict.fromkeys(folders)]
 
 

@@ -45,19 +45,19 @@ def compare(arguments: argparse.Namespace) -> int:
         prepare(folder)
     errors: list[SymdynError] = []
     if files:
-        found = _one_by_one(cases, errors)
+        result = _one_by_one(cases, errors)
     else:
         processes = os.cpu_count() or 1
-        found = compare_lecture(arguments.cases or None, arguments.jobs or (processes if arguments.all else 1))
+        result = compare_lecture(arguments.cases or None, arguments.jobs or (processes if arguments.all else 1))
     if arguments.all:
-        print(found)
-    elif len(found):
-        print("\n\n".join(map(str, found)))
-    if folder is not None and len(found):
-        _write(found, folder)
+        print(result)
+    elif len(result):
+        print("\n\n".join(map(str, result)))
+    if folder is not None and len(result):
+        _write(result, folder)
     for error in errors:
         complain(str(error), WRONG)
-    return WRONG if errors else 0 if found.decided else FAILED
+    return WRONG if errors else 0 if result.decided else FAILED
 
 
 def _chosen(names: Sequence[str]) -> list[Case]:
@@ -82,10 +82,10 @@ def _one_by_one(cases: Sequence[Case], errors: list[SymdynError]) -> Comparisons
     return Comparisons(tuple(done), clock.monotonic() - start)
 
 
-def _write(found: Comparisons, folder: Path) -> None:
+def _write(result: Comparisons, folder: Path) -> None:
     from symdyn.comparison.reports import write_reports
 
-    for path in write_reports(found, folder):
+    for path in write_reports(result, folder):
         print(path)
 
 

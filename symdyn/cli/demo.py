@@ -29,7 +29,7 @@ def demo(arguments: argparse.Namespace) -> int:
         folder = write_files(equations, ["c", "numpy"], arguments.output)
     with _Stage("compile"):
         module = equations.compile()
-        module.unit("rhs")
+        module.library("rhs")
         print(f"  {_loaded(module)}")
     with _Stage("simulate"):
         solution = module.simulate()

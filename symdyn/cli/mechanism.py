@@ -30,7 +30,7 @@ def find_mechanism(name: str, options: Mapping[str, Any]) -> System:
 
     if is_file(name):
         return userfile.from_file(Path(name), options)
-    with _refused():
+    with _rejected():
         case = named(name, options)
     return case.maker()(**case.options)
 
@@ -46,7 +46,7 @@ def find_system_under_test(name: str, options: Mapping[str, Any], end: float | N
 
     if is_file(name):
         return from_maker(title(Path(name).stem, options), userfile.maker(Path(name)), end, options)
-    with _refused():
+    with _rejected():
         return named_case(name, end, options)
 
 
@@ -58,7 +58,7 @@ def title_of(name: str, options: Mapping[str, Any]) -> str:
 
 
 @contextlib.contextmanager
-def _refused() -> Iterator[None]:
+def _rejected() -> Iterator[None]:
     """A name or an option that there is not becomes a Stop, which says what the command line takes besides."""
     from symdyn.bench.work.cases import Unknown
 

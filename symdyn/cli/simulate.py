@@ -64,9 +64,9 @@ def _make_consistent(module: Module, values: dict[str, Any], t: float, keep: lis
     """Put the nearest consistent q and u in place of those given, and print what changed."""
     q, u = module.consistent(values["q"], values["u"], values["params"], t=t, keep=keep)
     changed = []
-    for what, found in (("q", q), ("u", u)):
+    for what, result in (("q", q), ("u", u)):
         given = {**module.metadata.initial, **(values[what] or {})}
-        for name, after in zip(module.metadata.names(what), map(float, found), strict=True):
+        for name, after in zip(module.metadata.names(what), map(float, result), strict=True):
             before = float(given.get(name, 0.0))
             if abs(after - before) > 1e-12 * max(1.0, abs(before)):
                 changed.append(f"{name} from {before:.6g} to {after:.6g}")

@@ -56,8 +56,8 @@ def _configured() -> str | None:
         import dask
     except ImportError:
         return os.environ.get("DASK_SCHEDULER_ADDRESS")
-    found = dask.config.get("scheduler-address", None)
-    return str(found) if found else None
+    result = dask.config.get("scheduler-address", None)
+    return str(result) if result else None
 
 
 def _host(address: str) -> str:
@@ -72,23 +72,24 @@ def show_status(folder: Path, cluster: Cluster | None) -> int:
     from symdyn.ensembles.progress import read_status
     from symdyn.ensembles.slurm import queue
 
-    found = read_status(folder, cluster.lease if cluster is not None else LEASE)
-    failed = f", {found.n_failed} of them failed" if found.n_failed else ""
-    if found.complete:
-        print(f"{found.system}: all {found.count} samples are done{failed}; the results are in {folder}")
+    result = read_status(folder, cluster.lease if cluster is not None else LEASE)
+    failed = f", {result.n_failed} of them failed" if result.n_failed else ""
+    if result.complete:
+        print(f"{result.system}: all {result.count} samples are done{failed}; the results are in {folder}")
         return 0
-    print(f"{found.system}: {found.n_done} of {found.count} samples are done ({100 * found.n_done / found.count:.3g} %){failed}")
-    lost = [w for w in found.workers if w.lost]
-    working = [w for w in found.workers if not w.lost and w.state != "has left"]
-    left = f", about {in_time((found.count - found.n_done) / found.rate)} are left" if found.rate else ""
+    part = 100 * result.n_done / result.count
+    print(f"{result.system}: {result.n_done} of {result.count} samples are done ({part:.3g} %){failed}")
+    lost = [w for w in result.workers if w.lost]
+    working = [w for w in result.workers if not w.lost and w.state != "has left"]
+    left = f", about {in_time((result.count - result.n_done) / result.rate)} are left" if result.rate else ""
     print(f"{counted(len(working), 'worker')} at work"
-          + (f", {len(lost)} lost" if lost else "") + (f": {found.rate:.3g} samples a second{left}" if working else ""))
-    for worker in found.workers[:LISTED]:
+          + (f", {len(lost)} lost" if lost else "") + (f": {result.rate:.3g} samples a second{left}" if working else ""))
+    for worker in result.workers[:LISTED]:
         state = "is lost" if worker.lost else worker.state
         print(f"  {worker.name}{f' (job {worker.task})' if worker.task else ''}: {counted(worker.samples, 'sample')}, {state}, "
               f"heard of {in_time(worker.silent)} ago")
-    if len(found.workers) > LISTED:
-        print(f"  and {len(found.workers) - LISTED} more")
+    if len(result.workers) > LISTED:
+        print(f"  and {len(result.workers) - LISTED} more")
     if jobs := queue(folder):
         print(jobs)
     return 0
@@ -110,8 +111,8 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
         there = check_folder(folder, arguments.resume)
         asked = plan.size is not None
         plan = plan if there is None else replace(plan, size=there["chunk"])
-        plan, measured, found = _predicted(plan, cluster, folder, formats)
-        faults = contradictions(found, measured, cluster, asked)
+        plan, measured, result = _predicted(plan, cluster, folder, formats)
+        faults = contradictions(result, measured, cluster, asked)
         if faults:
             several = len(faults) > 1
             raise Stop(f"{arguments.file} has {len(faults)} faults:\n  - " * several + f"{arguments.file}: " * (not several)
@@ -133,10 +134,10 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
         job = send(home, script(cluster, plan.name, home, command, plan.setting.device != "cpu"))
     print(f"{plan.name}: Slurm's job {job} with {counted(cluster.workers or 1, 'worker')} computes "
           f"{counted(store.count, 'sample')} in {counted(store.n_chunks, 'chunk')}")
-    print(f"  predicted: {in_time(found.wall)}, {found.core / 3600:.3g} core hours, once all workers are there")
-    if cluster.time is not None and cluster.time < found.wall:
+    print(f"  predicted: {in_time(result.wall)}, {result.core / 3600:.3g} core hours, once all workers are there")
+    if cluster.time is not None and cluster.time < result.wall:
         print(f"  the time limit of {in_time(cluster.time)} ends before: go on with --resume, about "
-              f"{counted(math.ceil(found.wall / cluster.time), 'time')} in all, or ask for more workers or more time")
+              f"{counted(math.ceil(result.wall / cluster.time), 'time')} in all, or ask for more workers or more time")
     print(f"  symdyn sweep {arguments.file} --status --output {folder} shows how far it is; scancel {job} stops it")
     return 0
 
@@ -152,11 +153,11 @@ def dry_run(arguments: argparse.Namespace, plan: Plan, cluster: Cluster | None, 
 
     cluster = cluster or Cluster("here", 1, arguments.jobs)
     asked = plan.size is not None
-    plan, measured, found = _predicted(plan, cluster, folder, formats)
-    _print_prediction(plan, measured, found, cluster)
-    _print_limits(limits(plan if asked else replace(plan, size=None), measured, cluster, folder, found.workers, found.cores),
-                  found.count)
-    faults = contradictions(found, measured, cluster, asked)
+    plan, measured, result = _predicted(plan, cluster, folder, formats)
+    _print_prediction(plan, measured, result, cluster)
+    _print_limits(limits(plan if asked else replace(plan, size=None), measured, cluster, folder, result.workers, result.cores),
+                  result.count)
+    faults = contradictions(result, measured, cluster, asked)
     if faults:
         raise Stop(f"{arguments.file}: it would not run:\n  - " + "\n  - ".join(faults))
     return 0
@@ -174,24 +175,24 @@ def _predicted(plan: Plan, cluster: Cluster, folder: Path, formats: tuple[str, .
     return plan, measured, predict(plan, measured, plan.samples.count, workers, cores)
 
 
-def _print_prediction(plan: Plan, measured: Measured, found: Prediction, cluster: Cluster) -> None:
+def _print_prediction(plan: Plan, measured: Measured, result: Prediction, cluster: Cluster) -> None:
     n = len(measured.alone)
-    print(f"{plan.name}: {found.count:,} motions for {counted(found.workers, 'worker')} of {counted(found.cores, 'core')}, "
+    print(f"{plan.name}: {result.count:,} motions for {counted(result.workers, 'worker')} of {counted(result.cores, 'core')}, "
           f"predicted from {n} of them")
     failed = f"; {100 * measured.failed:.0f} % of them failed" if measured.failed else ""
-    print(f"  a motion      {in_small(found.motion)} of a core, from motion to motion ± {in_small(found.spread)}{failed}")
-    cost = f", cost {found.core / 3600 * cluster.price:.3g}" if cluster.price is not None else ""
-    print(f"  core hours    {found.core / 3600:.3g} ± {100 * found.error:.0f} %{cost}")
-    print(f"  wall time     {in_time(found.wall)}: {in_time(measured.start)} to begin, {in_time(found.merge)} to put the results "
-          f"together, {counted(found.files, 'chunk')} of {found.size:,}, {in_small(found.chunk)} each")
-    print(f"  disk          {_in_bytes(found.written)} at the most, {_in_bytes(found.result)} at the end; "
-          f"{counted(found.files, 'file')} on the way")
-    print(f"  memory        {_in_bytes(found.memory)} a worker")
+    print(f"  a motion      {in_small(result.motion)} of a core, from motion to motion ± {in_small(result.spread)}{failed}")
+    cost = f", cost {result.core / 3600 * cluster.price:.3g}" if cluster.price is not None else ""
+    print(f"  core hours    {result.core / 3600:.3g} ± {100 * result.error:.0f} %{cost}")
+    print(f"  wall time     {in_time(result.wall)}: {in_time(measured.start)} to begin, {in_time(result.merge)} to put the "
+          f"results together, {counted(result.files, 'chunk')} of {result.size:,}, {in_small(result.chunk)} each")
+    print(f"  disk          {_in_bytes(result.written)} at the most, {_in_bytes(result.result)} at the end; "
+          f"{counted(result.files, 'file')} on the way")
+    print(f"  memory        {_in_bytes(result.memory)} a worker")
 
 
-def _print_limits(found: list[Limit], count: int) -> None:
+def _print_limits(result: list[Limit], count: int) -> None:
     print("  What breaks first with more motions:")
-    for limit in found[:LIMITS]:
+    for limit in result[:LIMITS]:
         beyond = " (this sweep is beyond it)" if limit.motions <= count else ""
         print(f"    at {limit.motions:.2g}: {limit.what}; {limit.remedy}{beyond}")
 

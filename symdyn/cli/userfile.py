@@ -59,10 +59,10 @@ def cases_from_file(path: Path) -> list[Case]:
     """CASES of a user's file."""
     from symdyn.comparison.case import Case
 
-    found = _run(path, lambda module: getattr(module, "CASES", None))
-    if not isinstance(found, (list, tuple)) or not found or not all(isinstance(c, Case) for c in found):
-        raise Stop(f"{path} must define CASES, a list of symdyn.Case; found {found!r:.80}")
-    return list(found)
+    result = _run(path, lambda module: getattr(module, "CASES", None))
+    if not isinstance(result, (list, tuple)) or not result or not all(isinstance(c, Case) for c in result):
+        raise Stop(f"{path} must define CASES, a list of symdyn.Case; found {result!r:.80}")
+    return list(result)
 
 
 def _run(path: Path, take: Callable[[Any], Any]) -> Any:

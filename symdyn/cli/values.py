@@ -12,26 +12,26 @@ from symdyn.cli.messages import Stop
 
 def pairs(items: Iterable[str], what: str) -> dict[str, str]:
     """name -> text from name=text."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for item in items:
         name, sign, text = item.partition("=")
         if not (name and sign and text):
             raise Stop(f"{what} {item!r}: write name=value")
-        if name in found:
-            raise Stop(f"{what} {name} is given twice: {found[name]} and {text}")
-        found[name] = text
-    return found
+        if name in result:
+            raise Stop(f"{what} {name} is given twice: {result[name]} and {text}")
+        result[name] = text
+    return result
 
 
 def numbers(items: Iterable[str], what: str) -> dict[str, float] | None:
     """name -> number from name=number; None if there are none."""
-    found = {}
+    result = {}
     for name, text in pairs(items, what).items():
         try:
-            found[name] = float(text)
+            result[name] = float(text)
         except ValueError:
             raise Stop(f"{what} {name}={text}: {text!r} is not a number") from None
-    return found or None
+    return result or None
 
 
 def whole(text: str) -> int:

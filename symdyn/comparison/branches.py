@@ -43,7 +43,7 @@ class Branch:
 
 def branches(expressions: Iterable[sp.Expr]) -> list[Branch]:
     """All branches of the expressions that may be taken, those inside of others as well; each once."""
-    found: dict[tuple[Any, ...], str] = {}
+    result: dict[tuple[Any, ...], str] = {}
 
     def walk(e: sp.Basic, around: tuple[Any, ...]) -> None:
         if not e.has(sp.Piecewise, *_SIDES):
@@ -51,7 +51,7 @@ def branches(expressions: Iterable[sp.Expr]) -> list[Branch]:
         if not isinstance(e, sp.Piecewise):
             for condition in _sides(e):
                 if condition is not sp.S.true and condition is not sp.S.false:
-                    found.setdefault((*around, condition), str(condition))
+                    result.setdefault((*around, condition), str(condition))
             for part in e.args:
                 walk(part, around)
             return
@@ -59,13 +59,13 @@ def branches(expressions: Iterable[sp.Expr]) -> list[Branch]:
         for value, condition in e.args:
             here = inside if condition is sp.S.true else (*inside, condition)
             before = ", ".join(str(c) for _, c in e.args if c is not sp.S.true)
-            found.setdefault(here, f"none of {before}" if condition is sp.S.true else str(condition))
+            result.setdefault(here, f"none of {before}" if condition is sp.S.true else str(condition))
             walk(value, here)
             inside = (*inside, sp.Not(condition))
 
     for expression in expressions:
         walk(expression, ())
-    return [Branch(*item) for item in found.items()]
+    return [Branch(*item) for item in result.items()]
 
 
 def _sides(e: sp.Basic) -> list[Any]:

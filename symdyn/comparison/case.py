@@ -249,11 +249,11 @@ class Case:
                 faults += error.faults
                 return []
         faults += members(formulas, what, Formula, "symdyn.Formula(name, printed, derived)")
-        found = _those(formulas, Formula)
-        for formula in found:
+        result = _those(formulas, Formula)
+        for formula in result:
             unnamed = text(formula.name, "the name of a formula")
             faults += unnamed + formula.faults("that formula" if unnamed else formula.name)
-        return found
+        return result
 
     def _short(self, faults: list[str]) -> list[Formula]:
         """The formulas of the short form."""
@@ -267,10 +267,10 @@ class Case:
         formulas = []
         for name, printed in self.printed.items():
             unnamed = text(name, "a name in `printed`")
-            found = self._derived(name, faults) if not unnamed else None
+            result = self._derived(name, faults) if not unnamed else None
             faults += unnamed
-            if found is not None:
-                formulas.append(Formula(name, printed, found))
+            if result is not None:
+                formulas.append(Formula(name, printed, result))
         return formulas
 
     def _derived(self, name: str, faults: list[str]) -> Any:
@@ -280,16 +280,16 @@ class Case:
                 faults.append(f"{name} is printed, but `derived` has no {name}; it has {there or 'nothing'}")
             return self.derived.get(name)
         try:
-            found = guarded(lambda: getattr(self.derived, name, None), f"{name} of `derived`")()
+            result = guarded(lambda: getattr(self.derived, name, None), f"{name} of `derived`")()
         except CaseError as error:
             faults += error.faults
             return None
-        if found is None:
+        if result is None:
             faults.append(f"{name} is printed, but `derived` has no {name}; pass equations or a dict that has it")
-        elif callable(found):
+        elif callable(result):
             faults.append(f"{name} of `derived` is a method; call it and pass what it returns: derived={{{name!r}: ...}}")
             return None
-        return found
+        return result
 
     def _placed(self, formula: Formula) -> Formula:
         """With its slide, and with functions whose errors tell the formula."""

@@ -64,30 +64,30 @@ def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int
     decimals   printed numbers are rounded to so many decimals
     """
     pairs = list(zip(printed, derived, strict=True))
-    found: dict[int, Decision] = {k: SAME for k, (a, b) in enumerate(pairs) if a == b}
-    same = canonical([side for k, pair in enumerate(pairs) if k not in found for side in pair])
+    result: dict[int, Decision] = {k: SAME for k, (a, b) in enumerate(pairs) if a == b}
+    same = canonical([side for k, pair in enumerate(pairs) if k not in result for side in pair])
     if decimals is None:
-        _prove(pairs, found, same)
+        _prove(pairs, result, same)
     for k, pair in enumerate(pairs):
-        if k not in found:
+        if k not in result:
             try:
                 pairs[k] = pair[0].xreplace(same), pair[1].xreplace(same)
             except (ValueError, TypeError) as error:  # such as the larger of a complex number and another
-                found[k] = unformed(error)
+                result[k] = unformed(error)
             else:
-                found |= {k: SAME} if pairs[k][0] == pairs[k][1] else {}
-    reasons = _prove(pairs, found, {}) if decimals is None else dict.fromkeys(range(len(pairs)), "printed numbers are rounded")
-    rest = [k for k in range(len(pairs)) if k not in found]
+                result |= {k: SAME} if pairs[k][0] == pairs[k][1] else {}
+    reasons = _prove(pairs, result, {}) if decimals is None else dict.fromkeys(range(len(pairs)), "printed numbers are rounded")
+    rest = [k for k in range(len(pairs)) if k not in result]
     for k, decision in zip(rest, _by_numbers([pairs[k] for k in rest], decimals) if rest else []):
-        found[k] = replace(decision, how=f"{decision.how}; not proved: {reasons[k]}") if decision.equal else decision
-    return [found[k] for k in range(len(pairs))]
+        result[k] = replace(decision, how=f"{decision.how}; not proved: {reasons[k]}") if decision.equal else decision
+    return [result[k] for k in range(len(pairs))]
 
 
-def _prove(pairs: Sequence[tuple[sp.Expr, sp.Expr]], found: dict[int, Decision], same: Mapping[Any, Any]) -> dict[int, str]:
+def _prove(pairs: Sequence[tuple[sp.Expr, sp.Expr]], result: dict[int, Decision], same: Mapping[Any, Any]) -> dict[int, str]:
     """Decide what exact algebra proves, and return why it does not prove the others."""
-    open_ones = [k for k in range(len(pairs)) if k not in found]
+    open_ones = [k for k in range(len(pairs)) if k not in result]
     reasons = dict(zip(open_ones, unproved([pairs[k] for k in open_ones], TERMS, same) if open_ones else []))
-    found |= {k: Decision(True, "by exact algebra", proved=True) for k, reason in reasons.items() if not reason}
+    result |= {k: Decision(True, "by exact algebra", proved=True) for k, reason in reasons.items() if not reason}
     return reasons
 
 

@@ -128,16 +128,16 @@ class Proof:
         same = canonical(residual.entries)
         expressions = [e.xreplace(same) for e in residual.entries]
         evaluator = Expressions(expressions)
-        found: list[list[Residual]] = []
+        result: list[list[Residual]] = []
         for point in points(set(same.values())):
             values = evaluator.at(point)
             if any(v is None for v in values):
                 continue
             again = evaluator.at(point, 2 * DIGITS)
-            found.append([_residual(v, w, e.has(sp.Float)) for v, w, e in zip(values, again, expressions)])
-            if len(found) == POINTS or not same:
+            result.append([_residual(v, w, e.has(sp.Float)) for v, w, e in zip(values, again, expressions)])
+            if len(result) == POINTS or not same:
                 break
-        return _over_points(found, len(expressions))
+        return _over_points(result, len(expressions))
 
 
 def _residual(value: Any, again: Any, decimal: bool) -> Residual:
@@ -149,11 +149,11 @@ def _residual(value: Any, again: Any, decimal: bool) -> Residual:
     return Residual(size, vanishes, not vanishes)
 
 
-def _over_points(found: list[list[Residual]], n: int) -> list[Residual]:
-    if not found:
+def _over_points(result: list[list[Residual]], n: int) -> list[Residual]:
+    if not result:
         return [Residual(float("nan"), False, False)] * n
     return [Residual(max(r.size for r in entry), all(r.vanishes for r in entry), any(r.visible for r in entry))
-            for entry in zip(*found)]
+            for entry in zip(*result)]
 
 
 def _largest(residuals: list[Residual]) -> float:
@@ -284,7 +284,7 @@ class _Differentiation(Proof):
         names = set(path.names) | set(target.names) | moving
         heads = {n.removesuffix("_dot").removesuffix("_ddot") for n in names if n.endswith(("_dot", "_ddot"))}
         every = {sp.Symbol(n) for n in names | {h + end for h in heads for end in ("", "_dot", "_ddot")}} | set(same.values())
-        found: list[list[Residual]] = []
+        result: list[list[Residual]] = []
         for drawn in points(_one_each(every)):
             point = {name: own.mpf(value) for name, value in drawn.items()}
 
@@ -302,10 +302,10 @@ class _Differentiation(Proof):
                 continue
             slopes = _central_difference(three, step, self.order)
             scale = max(abs(v) for v in [*values, *slopes])
-            found.append([_relative(x - y, scale) for x, y in zip(values, slopes)])
-            if len(found) == POINTS:
+            result.append([_relative(x - y, scale) for x, y in zip(values, slopes)])
+            if len(result) == POINTS:
                 break
-        return _over_points(found, len(given.entries))
+        return _over_points(result, len(given.entries))
 
 
 def _central_difference(three: list[list[Any]], step: Any, order: int) -> list[Any]:
@@ -371,7 +371,7 @@ class _EnergyBalance(Proof):
                                    *[sp.diff(E, x) for x in q], *[sp.diff(E, x) for x in v],
                                    sp.diff(E, symbol("t")), P])
         own = context()
-        found: list[list[Residual]] = []
+        result: list[list[Residual]] = []
         for point in points({*plain.values(), *q, *v, *a}):
             values = expressions.at(point)
             if any(value is None for value in values):
@@ -385,10 +385,10 @@ class _EnergyBalance(Proof):
             terms = [E_q * point[x.name] for E_q, x in zip(rest[:n], v)]
             terms += [E_v * accelerations[k] for k, E_v in enumerate(rest[n:2 * n])]
             terms += [rest[-2], -rest[-1]]
-            found.append([_relative(sum(terms), max(abs(term) for term in terms))])
-            if len(found) == POINTS:
+            result.append([_relative(sum(terms), max(abs(term) for term in terms))])
+            if len(result) == POINTS:
                 break
-        return _over_points(found, 1)
+        return _over_points(result, 1)
 
 
 __all__ = ["Evidence", "Proof", "dimensions", "energy_balance", "limit", "numeric_derivative", "other"]

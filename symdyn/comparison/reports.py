@@ -127,11 +127,11 @@ def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
 
 def _slips(comparisons: Comparisons, pages: Pages, broken: bool) -> list[dict[str, Any]]:
     """The errata of all cases, those that repeat one slip together, at the place of the first."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    result: dict[str, list[dict[str, Any]]] = {}
     for case in comparisons:
         for erratum in _errata(case, pages, broken):
-            found.setdefault(erratum["slip"], []).append(erratum)
-    return [{"sentence": slip, "errata": errata} for slip, errata in found.items()]
+            result.setdefault(erratum["slip"], []).append(erratum)
+    return [{"sentence": slip, "errata": errata} for slip, errata in result.items()]
 
 
 def _remark(case: Comparison, remark: Remark) -> dict[str, Any]:
@@ -143,8 +143,8 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
     """broken: formulas are lists of lines that fit the page, otherwise one line each."""
     rows = []
     for formula, erratum in case.errata:
-        evidence, found = erratum.evidence, corrections(formula, erratum.entries)
-        wide = any(max(width(c.printed), width(c.right)) > ERRATA_COLUMN for c in found)
+        evidence, result = erratum.evidence, corrections(formula, erratum.entries)
+        wide = any(max(width(c.printed), width(c.right)) > ERRATA_COLUMN for c in result)
         room = ERRATA_PAGE if wide else ERRATA_COLUMN
         slide = f"{formula.slide.section} {formula.slide.title}".strip()
         letters = formula.latex or ""
@@ -158,7 +158,7 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
                      "corrections": [{"place": c.place,
                                       "printed": pages.lines(room, c.printed, c.wrong) if broken else formula_latex(c.printed),
                                       "right": pages.lines(room, c.right) if broken else formula_latex(c.right)}
-                                     for c in found]})
+                                     for c in result]})
     return rows
 
 

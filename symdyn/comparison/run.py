@@ -75,8 +75,8 @@ def _proved(equations: Any, other: Any) -> Proofs:
     from symdyn.sympy_mechanics.proof import prove_same
 
     if not isinstance(equations, Equations) or other is None:
-        what, found = ("the first", equations) if not isinstance(equations, Equations) else ("the second", other)
-        raise ArgumentError(f"compare takes equations with others of the same mechanism, {what} is {found!r:.80}; pass what "
+        what, result = ("the first", equations) if not isinstance(equations, Equations) else ("the second", other)
+        raise ArgumentError(f"compare takes equations with others of the same mechanism, {what} is {result!r:.80}; pass what "
                             "system.embedding(), .augmented() or .recursive() returns, then a KanesMethod, a LagrangesMethod, "
                             "(q, u, M, f), or other equations")
     return equations.prove(other) if isinstance(other, Equations) else prove_same(equations, other)
@@ -113,7 +113,7 @@ def find(cases: Iterable[Case | str]) -> list[Case]:
 
     Raises UnknownCase, and CaseError for anything else.
     """
-    return [found for case in cases for found in ([case] if isinstance(case, Case) else _of_lecture(case))]
+    return [result for case in cases for result in ([case] if isinstance(case, Case) else _of_lecture(case))]
 
 
 def _of_lecture(name: Any) -> list[Case]:
@@ -125,9 +125,9 @@ def _of_lecture(name: Any) -> list[Case]:
     if name in there:
         return [there[name]]
     if _SECTION.fullmatch(name):
-        found = [c for c in cases() if c.slide is not None and f"{c.slide.section}.".startswith(f"{name}.")]
-        if found:
-            return found
+        result = [c for c in cases() if c.slide is not None and f"{c.slide.section}.".startswith(f"{name}.")]
+        if result:
+            return result
         sections = dict.fromkeys(c.slide.section for c in cases() if c.slide is not None)
         raise UnknownCase(f"there is no case of section {name}; sections with cases are {', '.join(sections)}")
     near = difflib.get_close_matches(name, there, n=4, cutoff=0.4) or sorted(n for n in there if name.lower() in n)[:4]
@@ -135,8 +135,8 @@ def _of_lecture(name: Any) -> list[Case]:
     raise UnknownCase(f"there is no case {name!r}; {offer}")
 
 
-def _neither(found: Any) -> str:
-    return f"compare takes a name, a Case or several of them, found {found!r:.80} of type {type(found).__name__}"
+def _neither(result: Any) -> str:
+    return f"compare takes a name, a Case or several of them, found {result!r:.80} of type {type(result).__name__}"
 
 
 def _named(name: str, sent: bool = False) -> Comparison:

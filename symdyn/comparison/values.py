@@ -53,10 +53,10 @@ def rebuilt(e: Any, done: dict[Any, Any] | None = None) -> Any:
     if not e.args:
         return e
     done = {} if done is None else done
-    found = done.get(e)
-    if found is None:
-        found = done[e] = e.func(*[rebuilt(part, done) for part in e.args])
-    return found
+    result = done.get(e)
+    if result is None:
+        result = done[e] = e.func(*[rebuilt(part, done) for part in e.args])
+    return result
 
 
 def take(value: Any, what: str, faults: list[str]) -> Value | None:
@@ -86,10 +86,10 @@ def take(value: Any, what: str, faults: list[str]) -> Value | None:
 def taken(value: Any, what: str) -> Value:
     """The same; raises CaseError where `take` would add faults."""
     faults: list[str] = []
-    found = take(value, what, faults)
-    if found is None:
+    result = take(value, what, faults)
+    if result is None:
         raise CaseError(faults)
-    return found
+    return result
 
 
 def _is_matrix(value: Any) -> bool:

@@ -73,15 +73,15 @@ class _Parser:
     def _split(self) -> list[tuple[str, str, int]]:
         tokens, at = [], 0
         while self.text[at:].strip():
-            found = _TOKEN.match(self.text, at)
-            if found is None:
+            result = _TOKEN.match(self.text, at)
+            if result is None:
                 at += len(self.text[at:]) - len(self.text[at:].lstrip())
                 hint = "; names stand in double quotation marks, the expression then in single ones"
                 raise Wrong(f"is {shown(self.text, 80)}; {self.text[at]!r} at character {at + 1} is no part of an expression"
                             + (hint if self.text[at] == "'" else ""))
-            kind = found.lastgroup or ""
-            tokens.append((kind, found[kind], found.start(kind)))
-            at = found.end()
+            kind = result.lastgroup or ""
+            tokens.append((kind, result[kind], result.start(kind)))
+            at = result.end()
         return [*tokens, ("end", "", len(self.text))]
 
     def whole(self) -> Any:
@@ -93,8 +93,8 @@ class _Parser:
 
     def _unexpected(self, wanted: str) -> Wrong:
         kind, word, place = self.tokens[self.at]
-        found = "the end" if kind == "end" else f"{word!r} at character {place + 1}"
-        return Wrong(f"is {shown(self.text, 80)}; found {found}, expected {wanted}")
+        result = "the end" if kind == "end" else f"{word!r} at character {place + 1}"
+        return Wrong(f"is {shown(self.text, 80)}; found {result}, expected {wanted}")
 
     def _next(self) -> tuple[str, str, int]:
         self.at += 1
@@ -104,9 +104,9 @@ class _Parser:
         return self.tokens[self.at][:2] == ("sign", sign)
 
     def _take(self, sign: str) -> bool:
-        found = self._is(sign)
-        self.at += found
-        return found
+        result = self._is(sign)
+        self.at += result
+        return result
 
     def _need(self, sign: str) -> None:
         if not self._take(sign):
@@ -151,12 +151,12 @@ class _Parser:
         raise self._unexpected("a number, a name or '('")
 
     def _more(self, end: str) -> list[Any]:
-        found = []
+        result = []
         while self._take(","):
             if self._is(end):
                 break
-            found.append(self._value(0))
-        return found
+            result.append(self._value(0))
+        return result
 
     def _dotted(self, value: Any) -> Any:
         while self._take("."):
@@ -217,21 +217,21 @@ class _Parser:
 
     def _point(self) -> tuple[sp.Expr, ...]:
         self._need("[")
-        found = [self._value(0), *self._more("]")]
+        result = [self._value(0), *self._more("]")]
         self._need("]")
-        if len(found) not in (2, 3):
-            raise Wrong(f"is {shown(self.text, 80)}; a point has {len(found)} components; write 2 or 3")
-        return tuple(sp.sympify(e, strict=True) for e in [*found, sp.S.Zero][:3])
+        if len(result) not in (2, 3):
+            raise Wrong(f"is {shown(self.text, 80)}; a point has {len(result)} components; write 2 or 3")
+        return tuple(sp.sympify(e, strict=True) for e in [*result, sp.S.Zero][:3])
 
     def _indices(self, word: str) -> tuple[int, ...]:
         self._need("[")
-        found = [self._value(0), *self._more("]")]
+        result = [self._value(0), *self._more("]")]
         self._need("]")
-        if len(found) != len(_LARGEST[word]) or not all(
-                isinstance(k, sp.Integer) and 0 <= k < n for k, n in zip(found, _LARGEST[word], strict=True)):
+        if len(result) != len(_LARGEST[word]) or not all(
+                isinstance(k, sp.Integer) and 0 <= k < n for k, n in zip(result, _LARGEST[word], strict=True)):
             ranges = " and ".join(f"0 to {n - 1}" for n in _LARGEST[word])
             raise Wrong(f"is {shown(self.text, 80)}; {word} has components {ranges}")
-        return tuple(int(k) for k in found)
+        return tuple(int(k) for k in result)
 
 
 def _number(word: str) -> sp.Expr:
@@ -266,8 +266,8 @@ def _joined(sign: str, a: Any, b: Any) -> Any:
 
 def near(word: str, known: Mapping[str, Any] | list[str]) -> str:
     """A hint at the nearest names, for messages."""
-    found = difflib.get_close_matches(word, list(known), 3, cutoff=0.6)
-    if found:
-        return f"; did you mean {' or '.join(found)}?"
+    result = difflib.get_close_matches(word, list(known), 3, cutoff=0.6)
+    if result:
+        return f"; did you mean {' or '.join(result)}?"
     few = list(known)[:12]
     return f"; there are {', '.join(few)}{', ...' if len(known) > len(few) else ''}" if few else "; there are none"

@@ -72,13 +72,13 @@ class Form:
     @cached_property
     def entries(self) -> dict[str, Entry]:
         """The entries, in the order of the arguments."""
-        found = {}
+        result = {}
         for name, one in inspect.signature(self.made).parameters.items():
             if name != "self" and f"{self.word}.{name}" not in OBJECTS:
                 kind = ARGUMENTS.get(f"{self.word}.{name}") or ARGUMENTS[name]
                 empty = one.default is inspect.Parameter.empty
-                found[name] = Entry(kind, empty, None if empty or one.default is ... else one.default)
-        return found
+                result[name] = Entry(kind, empty, None if empty or one.default is ... else one.default)
+        return result
 
     def value(self, element: Any, argument: str) -> Any:
         """What an element has for an argument."""

@@ -16,7 +16,7 @@ Path = tuple[str | int, ...]
 
 def lines_of(text: str) -> dict[Path, int]:
     """Path of an entry -> its line, from 1. The text is TOML."""
-    found: dict[Path, int] = {}
+    result: dict[Path, int] = {}
     counts: dict[Path, int] = {}
     table: Path = ()
     free = _free_lines(text)
@@ -30,10 +30,10 @@ def lines_of(text: str) -> dict[Path, int]:
             if header[1] == "[[":
                 counts[table] = counts.get(table, -1) + 1
                 table = (*table, counts[table])
-            found[table] = number
+            result[table] = number
         elif key:
-            found[(*table, *_words(key[1]))] = number
-    return found
+            result[(*table, *_words(key[1]))] = number
+    return result
 
 
 def line_of(lines: dict[Path, int], path: Sequence[str | int]) -> int:
@@ -55,16 +55,16 @@ def _words(text: str) -> Path:
 def _free_lines(text: str) -> set[int]:
     """Lines that begin outside of texts and of brackets that are open."""
     free, depth, at, number = {1}, 0, 0, 1
-    for found in [*_INSIDE.finditer(text), None]:
-        end = len(text) if found is None else found.start()
+    for result in [*_INSIDE.finditer(text), None]:
+        end = len(text) if result is None else result.start()
         for _ in range(text.count("\n", at, end)):
             number += 1
             if depth <= 0:
                 free.add(number)
-        if found is None:
+        if result is None:
             break
-        token = found[0]
+        token = result[0]
         number += token.count("\n")
         depth += {"[": 1, "{": 1, "]": -1, "}": -1}.get(token, 0)
-        at = found.end()
+        at = result.end()
     return free

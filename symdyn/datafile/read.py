@@ -99,8 +99,8 @@ class _Reader:
             if key not in KEYS:
                 v.fault((key,), f"is no entry of a data file{near(key, list(KEYS))}")
         if content.get("format") != FORMAT:
-            found = f"is {shown(content['format'])}" if "format" in content else "is missing"
-            v.fault(("format",), f"{found}; this version reads format = {FORMAT}")
+            result = f"is {shown(content['format'])}" if "format" in content else "is missing"
+            v.fault(("format",), f"{result}; this version reads format = {FORMAT}")
         numbers = self._declare()
         v.bodies |= self._names("bodies")
         v.joints |= self._names("joints")
@@ -146,11 +146,11 @@ class _Reader:
     # -- symbols and what stands in front
 
     def _table(self, name: str) -> Mapping[str, Any]:
-        found = self.content.get(name, {})
-        if not isinstance(found, dict):
-            self.values.fault((name,), f"is {shown(found)}; write a table")
+        result = self.content.get(name, {})
+        if not isinstance(result, dict):
+            self.values.fault((name,), f"is {shown(result)}; write a table")
             return {}
-        return found
+        return result
 
     def _declare(self) -> tuple[dict[Any, float], dict[Any, float], dict[Any, str]]:
         """Declares the symbols; returns their defaults, initial values and units."""

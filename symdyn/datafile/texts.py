@@ -85,7 +85,7 @@ def number_or_text(e: sp.Expr, symbols: Mapping[str, sp.Symbol], what: str) -> i
         return int(e)
     if isinstance(e, sp.Float):
         return float(e)
-    foreign = sorted(f.func.__name__ if not isinstance(f, Result) else f.kernel.label for f in e.atoms(Result))
+    foreign = sorted(f.func.__name__ if not isinstance(f, Result) else f.intrinsic.label for f in e.atoms(Result))
     if foreign:
         raise ModelError([f"{what} calls {', '.join(dict.fromkeys(foreign))}, a function of the user, which is a program; a data "
                           "file holds none: describe this mechanism in Python"])

@@ -100,8 +100,8 @@ class Values:
 
     def expressions(self, given: Any, place: Place) -> list[sp.Expr]:
         """A list of expressions."""
-        found: list[sp.Expr] = self._each(given, place, self.expression)
-        return found
+        result: list[sp.Expr] = self._each(given, place, self.expression)
+        return result
 
     def matrix(self, given: Any, place: Place) -> list[Any]:
         """Rows of expressions, or a diagonal."""
@@ -195,8 +195,8 @@ class Values:
         return None if form is None else self.made(form, given, place, form.made)
 
     def _pair(self, given: Any, place: Place) -> Any:
-        found = self._each(given, place, self._shape)
-        return tuple(found) if len(found) == 2 else found[0] if found else None
+        result = self._each(given, place, self._shape)
+        return tuple(result) if len(result) == 2 else result[0] if result else None
 
     def _orientation(self, given: Any, place: Place) -> Any:
         angles, parameters = ORIENTATIONS

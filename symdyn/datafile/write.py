@@ -177,7 +177,7 @@ class _Writer:
 
     def _fields(self, form: Form, element: Any, typed: bool) -> dict[str, Any]:
         label = getattr(element, "name", None) or getattr(element, "label", None) or form.word
-        found: dict[str, Any] = {"type": form.word} if typed else {}
+        result: dict[str, Any] = {"type": form.word} if typed else {}
         for argument, entry in form.entries.items():
             value = form.value(element, argument)
             if value is None:
@@ -186,8 +186,8 @@ class _Writer:
             default = None if entry.default is None else self._value(entry.kind, entry.default, "")
             if entry.required or not ((taken == default and type(taken) is type(default)) or _usual(argument, taken)
                                       or taken in ([], "")):
-                found[argument] = taken
-        return found
+                result[argument] = taken
+        return result
 
     def _value(self, kind: str, value: Any, what: str) -> Any:
         def named(owner: Any) -> str:
@@ -236,19 +236,19 @@ class _Writer:
 
     def _event(self, event: Any) -> dict[str, Any]:
         what = f"event {event.name}"
-        found = {"name": event.name, "value": self._expression(event.value, what), "direction": event.direction,
-                 "stop": event.stop, "reset": {s.name: self._expression(e, f"{what}: reset of {s}") for s, e in event.reset}}
-        return {k: v for k, v in found.items() if v not in (0, False, {}) or k == "value"}
+        result = {"name": event.name, "value": self._expression(event.value, what), "direction": event.direction,
+                  "stop": event.stop, "reset": {s.name: self._expression(e, f"{what}: reset of {s}") for s, e in event.reset}}
+        return {k: v for k, v in result.items() if v not in (0, False, {}) or k == "value"}
 
     def _shape(self, drawn: Any) -> dict[str, Any]:
         kind = drawn.about["kind"]
         if kind not in DRAWN:
             self.faults.append(f"{drawn.what}: a shape of the kind {kind} has no words in a data file; draw it in Python")
             return {}
-        found = {"body": str(getattr(drawn.body, "name", drawn.body)), "kind": kind, "color": drawn.color,
-                 **{k: v for k, v in drawn.about.items() if k != "kind"},
-                 **{name: [self._expressions(row, drawn.what) for row in rows] for name, rows in drawn.values.items()}}
-        return {k: v for k, v in found.items() if v is not None}
+        result = {"body": str(getattr(drawn.body, "name", drawn.body)), "kind": kind, "color": drawn.color,
+                  **{k: v for k, v in drawn.about.items() if k != "kind"},
+                  **{name: [self._expressions(row, drawn.what) for row in rows] for name, rows in drawn.values.items()}}
+        return {k: v for k, v in result.items() if v is not None}
 
 
 def table_of(symbol: sp.Symbol) -> str:

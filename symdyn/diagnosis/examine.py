@@ -20,7 +20,7 @@ from symdyn.model.loop_check import CARRIER
 from symdyn.runtime.consistent import number
 from symdyn.shown import shown
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 if TYPE_CHECKING:
     from symdyn.formulation.constraints.augmented import ConstrainedTree
@@ -67,7 +67,7 @@ def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, 
         rows = len(model.loops) + len(model.constraints)
         return Diagnosis(model.name, len(model.speeds), rows, (), len(model.speeds) - rows, consistent=False, faults=error.faults,
                          remarks=("no more can be found out until this is put right",))
-    quantities = ConstrainedTree(tree, gathered, kernel=True)
+    quantities = ConstrainedTree(tree, gathered, intrinsic=True)
     names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
     equations = tree_result(quantities, "augmented", AugmentedEquations, lambda: equations, **names)
     faults = tuple(contradictions(equations)) if gathered.rows else ()
@@ -116,8 +116,8 @@ class _Examination:
         """For every row the loop or constraint that it belongs to."""
         owners = list(self.names)
         for closure in self.gathered.closures:
-            for place in closure.places:
-                owners[place] = closure.joint.name
+            for index in closure.places:
+                owners[index] = closure.joint.name
         return owners
 
     # -- counting
@@ -190,12 +190,12 @@ class _Examination:
     def _near(self, here: np.ndarray) -> np.ndarray:
         """Consistent states: here, then random ones around, (s, n_q)."""
         stream = np.random.default_rng(1)
-        found = self.states.at(here[None])
-        n_u = found.N.n
+        result = self.states.at(here[None])
+        n_u = result.N.n
         states = [here[None]]
         for _ in range(4):
             along = SPREAD * stream.uniform(-1, 1, (2 * STATES, n_u))
-            moved = here + self.states.moved(found[np.zeros(2 * STATES, dtype=int)], along)
+            moved = here + self.states.moved(result[np.zeros(2 * STATES, dtype=int)], along)
             q, residual = self.states.nearest(moved)
             states.append(q[residual <= FULFILLED])
             if sum(map(len, states)) > STATES:
@@ -204,10 +204,10 @@ class _Examination:
         others = others[np.abs(others - here).max(axis=1, initial=0.0) > APART]
         return np.concatenate([here[None], others])[:STATES + 1]
 
-    def _scaled(self, found: AtStates) -> tuple[Scaled, list[int]]:
+    def _scaled(self, result: AtStates) -> tuple[Scaled, list[int]]:
         """Scales that hold for all states, and the places of those with the largest rank."""
-        rows = np.median(found.C_scale[1:] if len(found.C_scale) > 1 else found.C_scale, axis=0)
-        raw = Scaled(self.states, rows, 1.0, 0).of(found)
+        rows = np.median(result.C_scale[1:] if len(result.C_scale) > 1 else result.C_scale, axis=0)
+        raw = Scaled(self.states, rows, 1.0, 0).of(result)
         sizes = np.linalg.svd(raw, compute_uv=False)
         size = float(np.median(sizes[:, 0])) if sizes.size else 1.0
         ranks = (sizes > RANK * max(size, 1e-300)).sum(axis=1)
@@ -233,8 +233,8 @@ class _Examination:
             return ()
         symbols = replace(self.equations.symbols, defaults=self.numbers.values, initial=dict(
             zip(self.equations.symbols.coordinates, self.start, strict=True)))
-        found = ranks(replace(self.equations, symbols=symbols))
-        return found.independent if found is not None and found.rank == rank else ()
+        result = ranks(replace(self.equations, symbols=symbols))
+        return result.independent if result is not None and result.rank == rank else ()
 
     def _dependency(self, k: int, used: Sequence[int], always: bool) -> Dependency:
         joints = tuple(dict.fromkeys(self.owners[j] for j in (*used, k)))
@@ -271,16 +271,16 @@ class _Examination:
                 self.remarks.append("the motion that is left by rank is infinitesimal: no step along it stays on the constraints")
             elif gone < self.reach - STEP and not near:
                 self.remarks.append(f"motions could be followed up to {gone:.3g} from the state only")
-        found = []
+        result = []
         for n in singular:
             J, _ = scaled.at(n.q[None])
             rows = self._lost_there(J[0], scaled.rank)
-            found.append(SingularState(dict(zip(self.states.names, map(float, n.q), strict=True)), n.size, n.distance, rows,
+            result.append(SingularState(dict(zip(self.states.names, map(float, n.q), strict=True)), n.size, n.distance, rows,
                                       n.size < LOST))
-        if any(s.lost for s in found):
+        if any(s.lost for s in result):
             self.advice.append("where rank is lost motions can branch, and multipliers of constraints that depend on each other "
                                "there are not unique; keep the motion away from there if that should not matter")
-        return replace(plain, singular=tuple(found), remarks=tuple(self.remarks))
+        return replace(plain, singular=tuple(result), remarks=tuple(self.remarks))
 
     def _lost_there(self, J: np.ndarray, rank: int) -> tuple[str, ...]:
         """Rows that take part in combinations that nearly vanish there, and do not elsewhere."""
@@ -291,22 +291,22 @@ class _Examination:
     # -- motions
 
     def _with_motions(self, plain: Diagnosis, q: np.ndarray, scaled: Scaled | None) -> Diagnosis:
-        found = self._motions(q, scaled)
+        result = self._motions(q, scaled)
         bodies = [b.name for b in self.model.bodies]
         speeds = [u.name for u in self.equations.symbols.speeds]
-        for b in found.idle:
+        for b in result.idle:
             around = [j for j, c in zip(self.model.joints, self.model.children, strict=True) if c == b and j.kind == "spherical"]
             if around:
                 self.advice.append(f"idle rotation of {bodies[b]}: sd.Universal in place of the spherical joint {around[0].name} "
                                    "takes it away; nothing else changes where the body is symmetric about that axis")
-        if found.massless:
-            self.advice.append(f"{', '.join(speeds[j] for j in found.massless)}: give the bodies that move mass or inertia, or "
+        if result.massless:
+            self.advice.append(f"{', '.join(speeds[j] for j in result.massless)}: give the bodies that move mass or inertia, or "
                                "hold the motion by a constraint")
         given = {b for b, name in enumerate(bodies) if not name.endswith(f"_{CARRIER}")}
-        parts = [tuple(bodies[b] for b in part if b in given) for part in found.parts]
+        parts = [tuple(bodies[b] for b in part if b in given) for part in result.parts]
         return replace(plain, parts=tuple(part for part in parts if part),
-                       still=tuple(bodies[b] for b in found.still if b in given), idle=tuple(bodies[b] for b in found.idle),
-                       massless=tuple(speeds[j] for j in found.massless), advice=tuple(self.advice),
+                       still=tuple(bodies[b] for b in result.still if b in given), idle=tuple(bodies[b] for b in result.idle),
+                       massless=tuple(speeds[j] for j in result.massless), advice=tuple(self.advice),
                        remarks=tuple(self.remarks))
 
     def _motions(self, q: np.ndarray, scaled: Scaled | None) -> Mobility:
@@ -315,28 +315,28 @@ class _Examination:
         stream = np.random.default_rng(2)
         values = {**self.states.values, **dict(zip(self.states.names, q.T, strict=True))}
         values |= {s.name: stream.uniform(0.5, 1.5, len(q)) for s in (*symbols.speeds, *symbols.states, *symbols.inputs)}
-        found = evaluate_rows(tape, values, len(q))
-        D = np.where(self.states.angular[None, :], found["length"][:, None], 1.0)
-        J = found["J"] / D[:, None, :]
+        result = evaluate_rows(tape, values, len(q))
+        D = np.where(self.states.angular[None, :], result["length"][:, None], 1.0)
+        J = result["J"] / D[:, None, :]
         m = 3 if self.model.planar else 6
         angular = np.arange(J.shape[1]) % m >= (2 if m == 3 else 3)
-        J[:, angular] *= found["length"][:, None, None]
-        M = found["M_tilde"] / D[:, :, None] / D[:, None, :]
+        J[:, angular] *= result["length"][:, None, None]
+        M = result["M_tilde"] / D[:, :, None] / D[:, None, :]
         defined = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(M).all(axis=(1, 2))
         n_u = len(symbols.speeds)
         free = [np.eye(n_u)] * len(q) if scaled is None else [np.linalg.svd(A)[2][scaled.rank:].T for A in scaled.at(q)[0]]
-        F = np.nan_to_num(found["F_tilde"] / D, nan=1.0)
+        F = np.nan_to_num(result["F_tilde"] / D, nan=1.0)
         return mobility([free[k] for k in np.flatnonzero(defined)], J[defined], M[defined], F[defined],
-                        found["frames"][defined][..., 3:].reshape(int(defined.sum()), -1, 3, 3))
+                        result["frames"][defined][..., 3:].reshape(int(defined.sum()), -1, 3, 3))
 
     # -- no state
 
     def _without_state(self, plain: Diagnosis, here: np.ndarray) -> Diagnosis:
-        found = self.states.at(here[None])
-        residual = self.states.residual(found)[0]
+        result = self.states.at(here[None])
+        residual = self.states.residual(result)[0]
         order = [int(k) for k in np.argsort(-np.abs(residual)) if not abs(residual[k]) <= FULFILLED]
-        if np.isfinite(found.C_r.values).all() and self.names:
-            A = Scaled(self.states, found.C_scale[0], 1.0, 0).of(found)
+        if np.isfinite(result.C_r.values).all() and self.names:
+            A = Scaled(self.states, result.C_scale[0], 1.0, 0).of(result)
             rank = _rank(A / max(np.linalg.norm(A[0], 2), 1e-300))
             A = A[0]
             if rank < len(A):

@@ -36,8 +36,8 @@ def mobility(free: Sequence[np.ndarray], J: np.ndarray, M: np.ndarray, F: np.nda
         axes.append({b: spin for b in range(n) if len(spin := _idle(T, Z, force, b, n))})
         bare = _without_mass(Z, mass)
         massless = bare if massless is None else massless | bare if bare and massless else set()
-    idle = [b for b in axes[0] if all(b in found for found in axes) and _same_axes([R[k, b].T @ found[b] if len(found[b]) == 3
-            else found[b] for k, found in enumerate(axes)])] if axes else []
+    idle = [b for b in axes[0] if all(b in result for result in axes) and _same_axes([R[k, b].T @ result[b] if len(result[b]) == 3
+            else result[b] for k, result in enumerate(axes)])] if axes else []
     parts = _components(near, [b for b in range(n) if moving[b]])
     return Mobility(parts, tuple(b for b in range(n) if not moving[b]), tuple(idle),
                     tuple(sorted(massless or ())))

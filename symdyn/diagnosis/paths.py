@@ -27,12 +27,12 @@ class Scaled:
 
     def at(self, q: np.ndarray) -> tuple[np.ndarray, AtStates]:
         """(s, n_c, n_u), and what it was made from."""
-        found = self.states.at(q)
-        return self.of(found), found
+        result = self.states.at(q)
+        return self.of(result), result
 
-    def of(self, found: AtStates) -> np.ndarray:
-        D = np.where(self.states.angular[None, None, :], found.length[:, None, None], 1.0)
-        scaled: np.ndarray = found.C_r.dense() * self.rows[None, :, None] / D / self.size
+    def of(self, result: AtStates) -> np.ndarray:
+        D = np.where(self.states.angular[None, None, :], result.length[:, None, None], 1.0)
+        scaled: np.ndarray = result.C_r.dense() * self.rows[None, :, None] / D / self.size
         return scaled
 
     def smallest(self, q: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def follow(scaled: Scaled, q: np.ndarray, reach: float) -> tuple[list[Near], flo
     here = np.repeat(q[None], len(ways), axis=0)
     ways = ways / np.abs(ways).max(axis=1, keepdims=True)
     trails = [_Trail(here[k], ways[k], scaled.smallest(q[None])[0]) for k in range(len(ways))]
-    found: list[Near] = []
+    result: list[Near] = []
     for _ in range(round(reach / STEP)):
         live = [t for t in trails if not t.ended]
         if not live:
@@ -74,8 +74,8 @@ def follow(scaled: Scaled, q: np.ndarray, reach: float) -> tuple[list[Near], flo
             if trail.passed_a_minimum():
                 near = _refined(scaled, trail)
                 if near.size < NEAR:
-                    found.append(near)
-    return _distinct(found), max(len(t.q) - 1 for t in trails) * STEP
+                    result.append(near)
+    return _distinct(result), max(len(t.q) - 1 for t in trails) * STEP
 
 
 class _Trail:
@@ -95,13 +95,13 @@ class _Trail:
 def _advance(scaled: Scaled, live: list[_Trail]) -> None:
     """One step of each motion; a motion ends where no step along it stays on the constraints."""
     q = np.array([t.q[-1] for t in live])
-    A, found = scaled.at(q)
+    A, result = scaled.at(q)
     free = np.linalg.svd(A)[2][:, scaled.rank:]
     ways = np.array([t.ways[-1] for t in live])
     ways = (np.swapaxes(free, 1, 2) @ (free @ ways[..., None]))[..., 0]
     sizes = np.abs(ways).max(axis=1, keepdims=True)
     ways = ways / np.where(sizes > 0, sizes, 1.0)
-    wanted = STEP * scaled.states.moved(found, ways)
+    wanted = STEP * scaled.states.moved(result, ways)
     moved, residual = scaled.states.nearest(q + wanted)
     smallest = scaled.smallest(moved)
     for k, trail in enumerate(live):
@@ -120,8 +120,8 @@ def _refined(scaled: Scaled, trail: _Trail) -> Near:
     """The least singular value around the last state but one of a motion; at its end, around the last."""
     start = max(len(trail.q) - (2 if trail.ended else 3), 0)
     q, way = trail.q[start], trail.ways[start]
-    _, found = scaled.at(q[None])
-    along = scaled.states.moved(found, way[None])[0]
+    _, result = scaled.at(q[None])
+    along = scaled.states.moved(result, way[None])[0]
     low, high = 0.0, 2 * STEP
     best = Near(trail.q[start], trail.sizes[start], start * STEP)
     for _ in range(ZOOMS):
@@ -136,9 +136,9 @@ def _refined(scaled: Scaled, trail: _Trail) -> Near:
     return best
 
 
-def _distinct(found: list[Near]) -> list[Near]:
+def _distinct(result: list[Near]) -> list[Near]:
     kept: list[Near] = []
-    for near in sorted(found, key=lambda n: n.size):
+    for near in sorted(result, key=lambda n: n.size):
         if all(np.abs(near.q - other.q).max() > 1e-3 for other in kept):
             kept.append(near)
     return sorted(kept, key=lambda n: n.distance)

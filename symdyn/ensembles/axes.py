@@ -121,10 +121,10 @@ def read_axis(value: Any, where: str, faults: list[str]) -> Axis | None:
 def _finite(value: Any) -> float | None:
     """A finite number; None for anything else."""
     try:
-        found = number(value)
+        result = number(value)
     except NotReal:
         return None
-    return found if np.isfinite(found) and not isinstance(value, (bool, np.bool_)) else None
+    return result if np.isfinite(result) and not isinstance(value, (bool, np.bool_)) else None
 
 
 def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Axis | None:
@@ -148,10 +148,10 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
     for key in wanted:
         if key not in value:
             faults.append(f"{where}.{key}: is missing")
-        elif (found := _finite(value[key])) is None:
+        elif (result := _finite(value[key])) is None:
             faults.append(f"{where}.{key}: must be a finite number, found {shown(value[key])}")
         else:
-            numbers[key] = found
+            numbers[key] = result
     if len(numbers) < len(wanted):
         return None
     record = {"distribution": name, **numbers}

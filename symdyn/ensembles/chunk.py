@@ -91,11 +91,11 @@ class Done:
     n_doubtful: int = 0
     worker: str = field(default_factory=lambda: f"{socket.gethostname()}-{os.getpid()}")
 
-    def fail(self, place: int, error: Exception) -> None:
+    def fail(self, index: int, error: Exception) -> None:
         """Note a failed member, and leave its row empty."""
         for column in self.columns.values():
-            column[place] = np.nan
-        self.failures.append((place, _message(error)))
+            column[index] = np.nan
+        self.failures.append((index, _message(error)))
 
 
 def run_chunk(chunk: Chunk) -> Done:

@@ -126,13 +126,13 @@ class Claims:
 
     def _latest(self) -> dict[str, tuple[int, Path]]:
         """Piece -> number and file of its last claim."""
-        found: dict[str, tuple[int, Path]] = {}
+        result: dict[str, tuple[int, Path]] = {}
         with contextlib.suppress(FileNotFoundError):  # all was done, and the folder is gone
             for entry in os.scandir(self.folder):
                 piece, _, number = entry.name.rpartition(".")
-                if piece and number.isdigit() and found.get(piece, (-1,))[0] < int(number):
-                    found[piece] = int(number), Path(entry.path)
-        return found
+                if piece and number.isdigit() and result.get(piece, (-1,))[0] < int(number):
+                    result[piece] = int(number), Path(entry.path)
+        return result
 
     def _ended(self, path: Path, now: float) -> bool:
         try:

@@ -119,10 +119,10 @@ def _values(table: Mapping[str, Any], kind: str | None, faults: list[str]) -> di
             faults.append(f"{where}: not known" + (f", did you mean {near[0]}?" if near else f"; known are {', '.join(KEYS)}"))
         elif kind is not None and kind not in KEYS[key]:
             faults.append(f"{where}: does not go with {kind}: {WHY[key]}; leave it out")
-        elif (found := _value(key, value)) is None:
+        elif (result := _value(key, value)) is None:
             faults.append(f"{where}: must be {WANTED[key]}, found {shown(value, 80)}")
         else:
-            values[key] = found
+            values[key] = result
     return values
 
 

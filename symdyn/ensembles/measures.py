@@ -118,10 +118,10 @@ def functions_of(module: Module, measures: Sequence[Measure]) -> list[str]:
 def take_measures(asked: Any, module: Module) -> list[Measure]:
     """Measures as the user gave them, see `read_measures`. Raises ArgumentError with all that is wrong."""
     faults: list[str] = []
-    found = read_measures(asked, module, faults)
+    result = read_measures(asked, module, faults)
     if faults:
         raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
-    return found
+    return result
 
 
 def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure]:
@@ -135,16 +135,16 @@ def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure
     if isinstance(asked, str) or not isinstance(asked, (Sequence, Mapping)) or not asked:
         faults.append(f"outcomes must be a list of texts such as 'max q1', or a mapping, found {shown(asked, 80)}")
         return []
-    found: list[Measure] = []
+    result: list[Measure] = []
     for label, value in asked.items() if isinstance(asked, Mapping) else [(text, text) for text in asked]:
         measure = _measure(label, value, module, faults)
         if measure is None:
             continue
-        if measure.label in RESERVED or "/" in measure.label or measure.label in [m.label for m in found]:
+        if measure.label in RESERVED or "/" in measure.label or measure.label in [m.label for m in result]:
             faults.append(f"outcome {shown(measure.label)}: the name is taken; names must differ from each other and from "
                           f"{', '.join(RESERVED)}, and have no /")
-        found.append(measure)
-    return found
+        result.append(measure)
+    return result
 
 
 def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measure | None:

@@ -13,7 +13,7 @@ from typing import Any
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SymdynError
-from symdyn.runtime.building.library import Unit
+from symdyn.runtime.building.library import Library
 from symdyn.runtime.building.texts import Texts
 from symdyn.runtime.integrating.methods import is_compiled
 from symdyn.runtime.module import Module
@@ -51,20 +51,20 @@ class PortableModule:
         self.module = Module(module.metadata, self._provide, module.backend, module.fallback)
         self.at_home = True
 
-    def _provide(self, what: str | RightSide) -> Unit:
-        unit: Any = self._given.unit(what)
-        self._texts.add(what, unit.source, unit.metadata)
-        return unit  # type: ignore[no-any-return]
+    def _provide(self, what: str | RightSide) -> Library:
+        library: Any = self._given.library(what)
+        self._texts.add(what, library.source, library.metadata)
+        return library  # type: ignore[no-any-return]
 
     def key(self) -> str:
         """Changes with what is computed."""
-        self.module.unit("rhs")
+        self.module.library("rhs")
         return hashlib.sha256(self._texts.source(RightSide()).encode()).hexdigest()
 
     @functools.cached_property
     def _packed(self) -> bytes:
         for name in self._functions:
-            self.module.unit(name)
+            self.module.library(name)
         record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain()}
         return zlib.compress(json.dumps(record).encode())
 
@@ -91,7 +91,7 @@ def _module(backend: str, packed: bytes) -> Module:
     record = json.loads(zlib.decompress(packed))
     metadata, texts = ModuleMetadata.of_plain(record["metadata"]), Texts(backend, record["units"])
 
-    def provide(what: str | RightSide) -> Unit:
+    def provide(what: str | RightSide) -> Library:
         if what not in texts:
             label = what if isinstance(what, str) else what.label
             raise NotSent(f"{metadata.name}: {label} was not sent along; it was not used by the samples that were tried in "

@@ -170,20 +170,20 @@ def fitted(plan: Plan, measured: Measured, workers: int, cores: int, time: float
     return replace(plan, size=max(size, -(-count // COMFORTABLE)))
 
 
-def contradictions(found: Prediction, measured: Measured, cluster: Cluster, asked: bool) -> list[str]:
+def contradictions(result: Prediction, measured: Measured, cluster: Cluster, asked: bool) -> list[str]:
     """Faults: what the cluster gives a worker, and does not suffice; asked: the size of a chunk was."""
     faults = []
-    if cluster.time is not None and cluster.time < measured.start + found.chunk:
-        remedy = "a smaller chunk" if asked and found.size > 1 else "a shorter motion"
+    if cluster.time is not None and cluster.time < measured.start + result.chunk:
+        remedy = "a smaller chunk" if asked and result.size > 1 else "a shorter motion"
         faults.append(f"cluster.time: {in_time(cluster.time)} are asked for, but a worker is predicted to take "
-                      f"{in_time(measured.start)} until it begins and {in_time(found.chunk)} for one chunk of "
-                      f"{counted(found.size, 'motion')}: it would end before anything is kept; ask for more time, or {remedy}")
-    elif cluster.time is not None and cluster.time < found.merge:
+                      f"{in_time(measured.start)} until it begins and {in_time(result.chunk)} for one chunk of "
+                      f"{counted(result.size, 'motion')}: it would end before anything is kept; ask for more time, or {remedy}")
+    elif cluster.time is not None and cluster.time < result.merge:
         faults.append(f"cluster.time: {in_time(cluster.time)} are asked for, but to put the results together is predicted "
-                      f"to take {in_time(found.merge)}; ask for more time")
-    if cluster.memory is not None and cluster.memory < found.memory:
+                      f"to take {in_time(result.merge)}; ask for more time")
+    if cluster.memory is not None and cluster.memory < result.memory:
         faults.append(f"cluster.memory: {in_bytes(cluster.memory)} are asked for, but a worker is predicted to take "
-                      f"{in_bytes(found.memory)}; ask for more" + (", or a smaller chunk" if found.size > 1 else ""))
+                      f"{in_bytes(result.memory)}; ask for more" + (", or a smaller chunk" if result.size > 1 else ""))
     return faults
 
 
@@ -193,12 +193,12 @@ def limits(plan: Plan, measured: Measured, cluster: Cluster, folder: Path, worke
         return predict(plan, measured, n, workers, cores)
 
     place = _there(folder)
-    found: list[Limit] = []
+    result: list[Limit] = []
 
     def add(what: str, holds: Callable[[int], bool], remedy: str) -> None:
         n = _first_above(holds)
         if n is not None:
-            found.append(Limit(what, n, remedy))
+            result.append(Limit(what, n, remedy))
 
     free = os.statvfs(place) if hasattr(os, "statvfs") else None
     if free is not None:
@@ -220,10 +220,10 @@ def limits(plan: Plan, measured: Measured, cluster: Cluster, folder: Path, worke
         add("putting the results together within the time limit", lambda n: of(n).merge <= limit, "ask for more time")
     add("a year", lambda n: of(n).wall <= 365 * 86400, "ask for more workers")
     if plan.samples.sampling == "sobol":
-        found.append(Limit("Sobol's sequence has no more points", SOBOL_LIMIT, "take latin_hypercube or random"))
-    found.append(Limit(f"samples of {MOST / 1e12:.3g} TB, the most there may be", MOST // (8 * len(plan.samples.names)),
-                       "divide the sweep into several"))
-    return sorted(found, key=lambda limit: limit.motions)
+        result.append(Limit("Sobol's sequence has no more points", SOBOL_LIMIT, "take latin_hypercube or random"))
+    result.append(Limit(f"samples of {MOST / 1e12:.3g} TB, the most there may be", MOST // (8 * len(plan.samples.names)),
+                        "divide the sweep into several"))
+    return sorted(result, key=lambda limit: limit.motions)
 
 
 def usable_cores() -> int:

@@ -109,21 +109,21 @@ def read_status(folder: Path, lease: float = LEASE) -> Status:
 
 
 def _workers(folder: Path, lease: float) -> list[Worker]:
-    found = []
+    result = []
     now = clock.time()
     for path, record, written in _records(folder):
         silent = max(0.0, now - written)
         lost = silent > lease and record["state"] == "at work"
         seconds = max(record["now"] - record["begun"], 1e-3)
         count: Mapping[str, int] = record["count"] or {path.stem.rpartition("-")[0]: 0}
-        found += [Worker(name, record["task"], record["state"], n, n / seconds, silent, lost) for name, n in count.items()]
-    return found
+        result += [Worker(name, record["task"], record["state"], n, n / seconds, silent, lost) for name, n in count.items()]
+    return result
 
 
 def _records(folder: Path) -> list[tuple[Path, dict[str, Any], float]]:
     """Files of workers, with what stands in them and when they were written; one that goes meanwhile is left out."""
-    found = []
+    result = []
     for path in folder.glob("[!.]*.json"):
         with contextlib.suppress(OSError, ValueError):
-            found.append((path, json.loads(path.read_text(encoding="utf-8")), path.stat().st_mtime))
-    return found
+            result.append((path, json.loads(path.read_text(encoding="utf-8")), path.stat().st_mtime))
+    return result

@@ -160,14 +160,14 @@ def prepare(asked: Plan, folder: Path, resume: bool) -> tuple[Plan, Store]:
 
     Raises ArgumentError where a folder holds something else; OSError as the disk does.
     """
-    found = check_folder(folder, resume)
+    result = check_folder(folder, resume)
     asked = asked if asked.setting.shapes else asked.tried()
-    size = asked.size or (found or {}).get("chunk") or asked.chunk_size()
+    size = asked.size or (result or {}).get("chunk") or asked.chunk_size()
     manifest = asked.manifest(size)
-    if found is None:
+    if result is None:
         write_manifest(folder, manifest)
-        found = check_folder(folder, True) or {}  # another worker may have been faster
-    check_same(folder, found, manifest)
+        result = check_folder(folder, True) or {}  # another worker may have been faster
+    check_same(folder, result, manifest)
     return asked, Store(folder, asked.samples.count, size, asked.columns)
 
 

@@ -86,10 +86,10 @@ class Samples:
             faults.append(f"{where}: paired values must be as many of each, found "
                           + ", ".join(f"{n}: {k}" for n, k in lengths.items()))
         if not faults and not drawn:
-            found = math.prod(lengths.values()) if sampling == "grid" else max(lengths.values(), default=1)
-            if count is not None and count != found:
-                faults.append(f"{where}: the {sampling} has {found} samples, but the count is {count}; leave the count out")
-            count = found
+            result = math.prod(lengths.values()) if sampling == "grid" else max(lengths.values(), default=1)
+            if count is not None and count != result:
+                faults.append(f"{where}: the {sampling} has {result} samples, but the count is {count}; leave the count out")
+            count = result
         taken = 0 if faults else 8 * len(axes) * int(count or 0)
         if taken > MOST:
             faults.append(f"{where}: {shown(count)} samples of {len(axes)} numbers take {in_bytes(taken)}; the most is "

@@ -53,11 +53,11 @@ class Store:
 
     def there(self) -> set[int]:
         """Which chunks have files, by their names alone."""
-        found: set[int] = set()
+        result: set[int] = set()
         with contextlib.suppress(FileNotFoundError):
-            found = {int(stem) for entry in os.scandir(self.chunks)
-                     if (stem := entry.name.removesuffix(".npz")).isdigit() and entry.name != stem}
-        return {k for k in found if k < self.n_chunks}
+            result = {int(stem) for entry in os.scandir(self.chunks)
+                      if (stem := entry.name.removesuffix(".npz")).isdigit() and entry.name != stem}
+        return {k for k in result if k < self.n_chunks}
 
     def drop_damaged(self) -> bool:
         """Remove chunks that the disk has damaged; whether there were any."""
@@ -103,7 +103,7 @@ class Store:
         def failed() -> Iterator[np.ndarray]:
             for k in range(self.n_chunks):
                 mask = np.zeros(self.samples_in(k), dtype=bool)
-                mask[[place for place, _ in self._failures(k)]] = True
+                mask[[index for index, _ in self._failures(k)]] = True
                 yield mask
 
         n_failed = 0
@@ -114,9 +114,9 @@ class Store:
                 failures = self._failures(k)
                 n_failed += len(failures)
                 values = block(k * self.size, k * self.size + self.samples_in(k)) if failures else np.zeros((0, 0))
-                for place, message in failures:
-                    given = {n: v if np.isfinite(v) else str(v) for n, v in zip(names, values[place].tolist(), strict=True)}
-                    line = {"index": k * self.size + place, "values": given, "message": message}
+                for index, message in failures:
+                    given = {n: v if np.isfinite(v) else str(v) for n, v in zip(names, values[index].tolist(), strict=True)}
+                    line = {"index": k * self.size + index, "values": given, "message": message}
                     file.write(json.dumps(line).encode() + b"\n")
 
         write_whole(self.folder / FAILURES, tell)
@@ -157,17 +157,17 @@ def check_folder(folder: Path, resume: bool) -> dict[str, Any] | None:
         raise ArgumentError(f"{folder} holds an ensemble already; pass resume=True (--resume) to go on with it, or name another "
                             "folder")
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ArgumentError(f"{path} cannot be read: {error}; name another folder") from None
-    return found
+    return result
 
 
-def check_same(folder: Path, found: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+def check_same(folder: Path, result: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
     """Raises ArgumentError with all that an ensemble in a folder has otherwise than it is asked for."""
     plain = json.loads(json.dumps(asked))
-    differ = [f"{key}: {_short(found.get(key))} there, {_short(plain.get(key))} now" for key in sorted({*found, *plain})
-              if found.get(key) != plain.get(key)]
+    differ = [f"{key}: {_short(result.get(key))} there, {_short(plain.get(key))} now" for key in sorted({*result, *plain})
+              if result.get(key) != plain.get(key)]
     if differ:
         raise ArgumentError(f"{folder} holds another ensemble; name another folder, or ask for the same:\n  "
                             + "\n  ".join(differ))
@@ -190,13 +190,13 @@ class Failure(TypedDict):
 
 def read_failures(folder: Path, most: int | None = None) -> list[Failure]:
     """Members that failed: index, values, message."""
-    found: list[Failure] = []
+    result: list[Failure] = []
     with (folder / FAILURES).open(encoding="utf-8") as file:
         for line in file:
-            if most is not None and len(found) >= most:
+            if most is not None and len(result) >= most:
                 break
-            found.append(json.loads(line))
-    return found
+            result.append(json.loads(line))
+    return result
 
 
 def _short(value: Any) -> str:

@@ -79,14 +79,14 @@ def _checked(module: Module, experiment: Experiment, which: str, faults: list[st
             faults.append(f"{which} measures {shown(name)}, which is neither a state nor an output; there are "
                           f"{', '.join(shapes)}")
             continue
-        found = real_of(given, module.name, f"{name} of {which} must be numbers")
-        if found.shape != (len(t), *shapes[name]):
-            faults.append(f"{name} of {which} has the shape {found.shape}; needed is {(len(t), *shapes[name])}, one row for each "
-                          "time")
-        elif np.isinf(found).any():
+        result = real_of(given, module.name, f"{name} of {which} must be numbers")
+        if result.shape != (len(t), *shapes[name]):
+            faults.append(f"{name} of {which} has the shape {result.shape}; needed is {(len(t), *shapes[name])}, one row for "
+                          "each time")
+        elif np.isinf(result).any():
             faults.append(f"{name} of {which} has infinite values; write NaN for those that are missing")
-        elif np.isnan(found).all():
+        elif np.isnan(result).all():
             faults.append(f"{name} of {which} has no value")
         else:
-            values[name] = found
+            values[name] = result
     return Measured(experiment, t, values, sum(int(np.isfinite(v).sum()) for v in values.values()))

@@ -75,10 +75,10 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
                 warnings.warn_explicit(doubt.message, doubt.category, doubt.filename, doubt.lineno, source=doubt.source)
     if not np.isfinite(first).all():
         raise EvaluationError(f"{module.name}: no motion from the guess of the fit, {problem.failure}; take another start")
-    found = Fit.of(problem, minimum(problem, max_steps))
-    if not found.success:
-        warnings.warn(f"{module.name}: the fit found no minimum: {found.message}", SimulationWarning, stacklevel=2)
-    return found
+    result = Fit.of(problem, minimum(problem, max_steps))
+    if not result.success:
+        warnings.warn(f"{module.name}: the fit found no minimum: {result.message}", SimulationWarning, stacklevel=2)
+    return result
 
 
 def _problem(module: Module, experiments: list[Measured], parameters: Any, initial: Any, bounds: Any, priors: Any, noise: Any,
@@ -136,18 +136,18 @@ def _problem(module: Module, experiments: list[Measured], parameters: Any, initi
 
 def _names(given: Any, there: Sequence[str], what: str, kind: str, faults: list[str]) -> list[str]:
     listed = list(given) if isinstance(given, (list, tuple)) else [given]
-    found: list[str] = []
+    result: list[str] = []
     for key in listed:
         name = str(name_of(key))
         if name not in there:
             near = difflib.get_close_matches(name, there, 3)
             faults.append(f"{what} has {shown(key)}, which is no {kind}; " + (f"did you mean {' or '.join(near)}?" if near else
                                                                           f"there are {', '.join(there)}"))
-        elif name in found:
+        elif name in result:
             faults.append(f"{what} has {name} twice")
         else:
-            found.append(name)
-    return found
+            result.append(name)
+    return result
 
 
 def _mapping(given: Any, what: str, example: str, faults: list[str]) -> Mapping[Any, Any]:

@@ -100,11 +100,11 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
     system = _System.of(module, motions, "regressor" if consistent else "base_regressor", loss, moving)
     if system.n < len(names):
         raise ArgumentError(f"{module.name}: {len(labels)} unknowns are identified from {system.n} values; measure more")
-    found = _Solution.of(system, deviations, charts, float(spread))
-    return Identification(module, dict(zip(labels, found.values.tolist(), strict=True)), found.covariance,
-                          dict(zip(module.metadata.u, found.noise.tolist(), strict=True)), found.condition,
-                          tuple(combination(v, labels) for v in echelon(found.open_ones)), tuple(system.residuals(found.values)),
-                          consistent, found.degrees, noise is not None)
+    result = _Solution.of(system, deviations, charts, float(spread))
+    return Identification(module, dict(zip(labels, result.values.tolist(), strict=True)), result.covariance,
+                          dict(zip(module.metadata.u, result.noise.tolist(), strict=True)), result.condition,
+                          tuple(combination(v, labels) for v in echelon(result.open_ones)),
+                          tuple(system.residuals(result.values)), consistent, result.degrees, noise is not None)
 
 
 @dataclass(frozen=True)

@@ -93,10 +93,10 @@ def rows_of(module: Module, data: Any) -> list[Rows]:
     if not isinstance(listed, (list, tuple)) or not listed or not all(isinstance(one, MeasuredMotion) for one in listed):
         raise ArgumentError(f"{module.name}: data is {shown(data)}; pass an sd.MeasuredMotion or a list of them")
     faults: list[str] = []
-    found = [_rows(module, motion, f"motion {k + 1}", faults) for k, motion in enumerate(listed)]
+    result = [_rows(module, motion, f"motion {k + 1}", faults) for k, motion in enumerate(listed)]
     if faults:
         raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
-    return [one for one in found if one is not None]
+    return [one for one in result if one is not None]
 
 
 def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str]) -> Rows | None:

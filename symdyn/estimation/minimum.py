@@ -301,16 +301,16 @@ def _iterated(problem: Problem, start: np.ndarray, held: np.ndarray, max_steps: 
 
     least, most = problem.least[free], problem.most[free]
     with np.errstate(over="ignore", invalid="ignore"):  # far from the minimum squares may overflow: such a step is not taken
-        found = least_squares(residuals, start[free], derivatives, (least, most), "trf", x_scale=scale[free],
-                              max_nfev=max_steps, ftol=PRECISION, xtol=PRECISION, gtol=_FLAT)
-    gradient, curvature = found.jac.T @ found.fun, np.sum(found.jac**2, axis=0)
+        result = least_squares(residuals, start[free], derivatives, (least, most), "trf", x_scale=scale[free],
+                               max_nfev=max_steps, ftol=PRECISION, xtol=PRECISION, gtol=_FLAT)
+    gradient, curvature = result.jac.T @ result.fun, np.sum(result.jac**2, axis=0)
     step = np.divide(-gradient, curvature, out=np.zeros(len(gradient)), where=curvature > 0)
-    room = np.where(step > 0, most - found.x, found.x - least)
+    room = np.where(step > 0, most - result.x, result.x - least)
     pressed = np.zeros(len(start), dtype=bool)
     pressed[free] = ((room <= _NEXT * scale[free]) & (np.abs(step) > room)) | (
-        np.minimum(most - found.x, found.x - least) <= _ON * scale[free])
-    message = str(found.message) if found.status > 0 else (
+        np.minimum(most - result.x, result.x - least) <= _ON * scale[free])
+    message = str(result.message) if result.status > 0 else (
         f"no minimum within {max_steps} steps; pass a nearer start, or a larger max_steps")
-    x, n = whole(found.x), len(found.fun) - len(rows)
-    all_derivatives = problem.jacobian(x) if held.any() else found.jac[:n]
-    return Point(x, found.fun[:n], all_derivatives, held, found.status > 0, message), pressed
+    x, n = whole(result.x), len(result.fun) - len(rows)
+    all_derivatives = problem.jacobian(x) if held.any() else result.jac[:n]
+    return Point(x, result.fun[:n], all_derivatives, held, result.status > 0, message), pressed

@@ -61,14 +61,14 @@ class Fit(Estimate):
     known_noise: bool
 
     @classmethod
-    def of(cls, problem: Problem, found: Minimum) -> Fit:
+    def of(cls, problem: Problem, result: Minimum) -> Fit:
         """From the minimum of a problem."""
         labels = [unknown.label for unknown in problem.unknowns]
-        motions, residuals = problem.motions(found.x), problem.left(found.x)
-        return cls(problem.module, dict(zip(labels, map(float, found.x), strict=True)), found.covariance, found.noise,
-                   found.misfit, tuple(combination(v, labels) for v in echelon(found.open_ones)),
-                   tuple(label for label, held in zip(labels, found.at_bounds, strict=True) if held), motions, residuals,
-                   found.success, found.message, problem.runs, found.degrees, problem.known)
+        motions, residuals = problem.motions(result.x), problem.left(result.x)
+        return cls(problem.module, dict(zip(labels, map(float, result.x), strict=True)), result.covariance, result.noise,
+                   result.misfit, tuple(combination(v, labels) for v in echelon(result.open_ones)),
+                   tuple(label for label, held in zip(labels, result.at_bounds, strict=True) if held), motions, residuals,
+                   result.success, result.message, problem.runs, result.degrees, problem.known)
 
     def plot(self, path: PathName | None = None) -> Figure:
         """Measured values, motion, and residuals over time; written to a file if a path is given.

@@ -96,8 +96,8 @@ class Start:
             begun[given] = target[given] if done + step == 1.0 else self._x[given] + (done + step) * change
             begun[self._dependent_q] += self._predicted(x, begun, there)
             try:
-                found = self._solved(begun, there)
-                far = np.abs((found - begun)[:self._n_q] * self._lengths).max(initial=0.0) > _NEAR * self._size
+                result = self._solved(begun, there)
+                far = np.abs((result - begun)[:self._n_q] * self._lengths).max(initial=0.0) > _NEAR * self._size
             except EvaluationError:
                 far = True
             if far:
@@ -106,24 +106,24 @@ class Start:
                     raise EvaluationError(f"{self._module.name}: no start fulfils the constraints with {self._shown(values, p)}: "
                                           "on the way there from the guess the mechanism does not close")
                 continue
-            x, done = found, done + step
+            x, done = result, done + step
         return self._with_speeds(x, p)
 
     def derivative(self, x: np.ndarray, p: np.ndarray, by: str) -> np.ndarray:
         """Of the start by a parameter, or by the initial value of a state, (n_x,)."""
         metadata = self._module.metadata
-        found = np.zeros(len(x))
+        result = np.zeros(len(x))
         of_parameters = np.zeros(len(p))
         if by in metadata.parameters:
             of_parameters[metadata.parameters.index(by)] = 1.0
         else:
-            found[metadata.x.index(by)] = 1.0
+            result[metadata.x.index(by)] = 1.0
         _, C_q, C_p = self._rows_q(x, p)
-        found[self._dependent_q] = self._dependents(C_q, self._dependent_q, C_q @ found[:self._n_q] + C_p @ of_parameters)
+        result[self._dependent_q] = self._dependents(C_q, self._dependent_q, C_q @ result[:self._n_q] + C_p @ of_parameters)
         _, C_u, C_dot_x, C_dot_p = self._rows_u(x, p)
-        left = C_dot_x @ found + C_dot_p @ of_parameters
-        found[self._n_q + self._dependent_u] = self._dependents(C_u, self._dependent_u, left)
-        return found
+        left = C_dot_x @ result + C_dot_p @ of_parameters
+        result[self._n_q + self._dependent_u] = self._dependents(C_u, self._dependent_u, left)
+        return result
 
     def _predicted(self, x: np.ndarray, moved: np.ndarray, p: np.ndarray) -> np.ndarray:
         """The change of the dependent coordinates to first order."""
@@ -180,8 +180,8 @@ class Start:
         """Changes of the dependent ones that take away what is left; rows may depend on each other."""
         if not len(dependent):
             return np.zeros(0)
-        found: np.ndarray = np.linalg.lstsq(rows[:, dependent], -left, rcond=_AT_ALL)[0]
-        return found
+        result: np.ndarray = np.linalg.lstsq(rows[:, dependent], -left, rcond=_AT_ALL)[0]
+        return result
 
     def _kept(self, rows: np.ndarray, names: Sequence[str], fitted: Sequence[str], what: str) -> np.ndarray:
         """Places of what is kept, such that the columns of the others have the rank of all: what is fitted, then in order."""

@@ -69,9 +69,9 @@ class _Taken:
         entries = tuple(value.ravel())
         leaves = {leaf: self._leaves[leaf.args[1]] for leaf in reachable(entries)
                   if leaf.op == "leaf" and leaf.args[1] in self._leaves}
-        found = np.empty(len(entries), dtype=object)
-        found[:] = substitute(entries, leaves, self.first.recorder)
-        return found.reshape(value.shape)
+        result = np.empty(len(entries), dtype=object)
+        result[:] = substitute(entries, leaves, self.first.recorder)
+        return result.reshape(value.shape)
 
     def both(self, name: str) -> Pairs:
         one, other = self.first.quantity(name), self.of_second(name)
@@ -88,8 +88,8 @@ class _Taken:
 
 def _claims(taken: _Taken) -> list[tuple[str, Callable[[], Pairs]]]:
     first, second = taken.first.formulation, taken.second.formulation
-    found: list[tuple[str, Callable[[], Pairs]]] = [
+    result: list[tuple[str, Callable[[], Pairs]]] = [
         (f"{name} is the same", partial(taken.both, name)) for name in COMPARED if taken.has(name)]
     if not taken.first.constraints and taken.has("M_tilde", "k_tilde", "F_tilde") and taken.has("accelerations"):
-        found.append((f"accelerations of the {second} equations solve the {first} ones", taken.solved))
-    return found
+        result.append((f"accelerations of the {second} equations solve the {first} ones", taken.solved))
+    return result

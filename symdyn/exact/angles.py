@@ -101,13 +101,13 @@ class Angles:
     quarter argument -> quarter turns to be added to the combination
     """
 
-    def __init__(self, found: dict[Any, Linear]) -> None:
+    def __init__(self, result: dict[Any, Linear]) -> None:
         self.quarter: dict[Any, int] = {}
         units: list[tuple[Term, Fraction]] = []
         rows: dict[Any, dict[int, int]] = {}
         factors: dict[Term, list[Fraction]] = {}
         forms: dict[Any, Linear] = {}
-        for node, own in found.items():
+        for node, own in result.items():
             form = dict(own)
             turns = 0
             for term in list(form):

@@ -328,19 +328,19 @@ class Arranger:
         left = [_left(g) for g in groups]
         if len(q) > ALL and groups:
             groups = [groups[left.index(min(left))]] if min(left) < len(q) else []
-        found: list[Tree] = []
+        result: list[Tree] = []
         used = {letter for m in q for letter, _ in m}
         once = len(used) - 1 + sum([self.letters[letter].operations for letter in used])
         for group in groups:
-            found.append(self._gathered(group, self.nested))
-            if total(found[-1])[0] == once:  # each letter stands in it once
-                return found[-1]
+            result.append(self._gathered(group, self.nested))
+            if total(result[-1])[0] == once:  # each letter stands in it once
+                return result[-1]
         if not groups or len(q) <= BOTH or (len(q) <= self._most and min(left) > CLEAR * len(q)):
-            found.append(self.horner(q))
+            result.append(self.horner(q))
         squares = self._squares(q) if len(q) <= BOTH else None
         if squares is not None:
-            found.append(squares)
-        return min(found, key=total)
+            result.append(squares)
+        return min(result, key=total)
 
     def horner(self, p: Polynomial) -> Tree:
         """The letter in most terms is taken out of them, again and again."""
@@ -404,13 +404,13 @@ class Arranger:
         if key in self._split:
             return self._split[key]
         used = sorted({letter for m in q for letter, _ in m})
-        place = {letter: k for k, letter in enumerate(used)}
+        index = {letter: k for k, letter in enumerate(used)}
         context = fmpz_mpoly_ctx.get(("x", len(used)), "lex")
         rows: dict[tuple[int, ...], Any] = {}
         for m, c in q.items():
             exponents = [0] * len(used)
             for letter, power in m:
-                exponents[place[letter]] = power
+                exponents[index[letter]] = power
             rows[tuple(exponents)] = c
         if _coprime(rows, context):
             self._split[key] = None

@@ -47,8 +47,8 @@ def parsed(unit: str | None) -> Dimension | None:
 
     All that stands between a slash and the next divides."""
     tokens = re.findall(r"[A-Za-z]+|1|[/()]|\^ *\(? *-? *\d+ *\)?|[^\s*]", plain_unit(unit or ""))
-    found = _product_of(tokens) if tokens else None
-    return None if found is None or tokens else {base: n for base, n in found.items() if n}
+    result = _product_of(tokens) if tokens else None
+    return None if result is None or tokens else {base: n for base, n in result.items() if n}
 
 
 def _product_of(tokens: list[str]) -> Dimension | None:
@@ -130,10 +130,10 @@ class Dimensions:
         """Units that differ, of an entry that should have this one; None where they agree."""
         if not isinstance(entry, Node) or _constant(entry):
             return None
-        found = self._done[entry]
-        if found is None or self._unified(found, wanted):
+        result = self._done[entry]
+        if result is None or self._unified(result, wanted):
             return None
-        return text(self._resolved(found)), text(wanted)
+        return text(self._resolved(result)), text(wanted)
 
     def _step(self, node: Node) -> Dimension | None:
         op, args = node.op, node.args

@@ -43,7 +43,7 @@ class Ideal:
         self._own = [self._taken(p) for p in own]
         self._rules = [self._taken(p) for p in ring.relations]
         x = self._context.gens()
-        self._inverses = [x[k] * x[self._n + place] - 1 for place, k in enumerate(units)]
+        self._inverses = [x[k] * x[self._n + index] - 1 for index, k in enumerate(units)]
         self._bases: dict[tuple[int, bool], list[Any]] = {}
 
     def contains(self, p: Any) -> bool:
@@ -65,8 +65,8 @@ class Ideal:
             rows = [*self._own, *self._rules, *(self._inverses if inverses else ())]
             if step and rows:
                 integers = fmpz_mpoly_vec([_integer(p, self._integers) for p in rows], self._integers)
-                found: Any = integers.buchberger_naive(limits=LIMITS[step - 1])
-                rows += [self._context.from_dict(p.to_dict()) for p in found[0]]
+                result: Any = integers.buchberger_naive(limits=LIMITS[step - 1])
+                rows += [self._context.from_dict(p.to_dict()) for p in result[0]]
             self._bases[step, inverses] = sorted([p for p in rows if len(p)], key=lambda p: (len(p), str(p)))
         return self._bases[step, inverses]
 

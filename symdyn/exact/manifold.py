@@ -53,16 +53,16 @@ def relations_of(on: Any, claimed: Sequence[sp.Expr] = ()) -> list[sp.Expr]:
 
 def eliminated(relations: Sequence[sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
     """Symbols that relations in turn give by the others, where they stand linearly with a factor that is not zero."""
-    found: dict[sp.Symbol, sp.Expr] = {}
+    result: dict[sp.Symbol, sp.Expr] = {}
     for relation in relations:
-        e = sp.expand(relation.xreplace(found))
+        e = sp.expand(relation.xreplace(result))
         for s in sorted(e.free_symbols, key=str):
             factor = e.coeff(s)
             value = sp.expand((factor * s - e) / factor) if factor.is_nonzero else s
             if s not in value.free_symbols:
-                found = {**{k: v.xreplace({s: value}) for k, v in found.items()}, s: value}
+                result = {**{k: v.xreplace({s: value}) for k, v in result.items()}, s: value}
                 break
-    return found
+    return result
 
 
 def nonzero_parameters(on: Any) -> set[sp.Expr]:
@@ -77,12 +77,12 @@ def _constraints(equations: Equations, accelerating: bool) -> list[sp.Expr]:
         raise ArgumentError(f"{equations.name} ({equations.formulation}) has no constraints that a claim could hold on; pass "
                             "equations with loops or constraints, or expressions that are zero")
     C = [e for e, holonomic in zip(equations.explicit("C", simplify=False), equations.holonomic) if holonomic]
-    found = [*C, *equations.explicit("C_dot", simplify=False)]
-    found += [sum(p**2 for p in group) - 1 for group in equations.unit_groups]
+    result = [*C, *equations.explicit("C_dot", simplify=False)]
+    result += [sum(p**2 for p in group) - 1 for group in equations.unit_groups]
     if accelerating:
         accelerations = sp.Matrix([u.dot for u in equations.symbols.speeds])
-        found += list(equations.explicit("C_r", simplify=False) * accelerations - equations.explicit("F_d", simplify=False))
-    return found
+        result += list(equations.explicit("C_r", simplify=False) * accelerations - equations.explicit("F_d", simplify=False))
+    return result
 
 
 class States:
@@ -103,23 +103,23 @@ class States:
         """Values of the leaves that fulfil the relations to so many digits, by Newton's method with the smallest steps; None
         where it ends elsewhere, or at numbers that are not of the kind of their symbols."""
         for moved, tape in self.tapes:
-            found = _moved(tape, moved, values, digits)
-            if found is not None and all(_fits(value, self.symbols.get(leaf)) for leaf, value in found.items()) and all(
-                    abs(found[leaf]) > LEAST for leaf in self.nonzero if leaf in found):
-                return found
+            result = _moved(tape, moved, values, digits)
+            if result is not None and all(_fits(value, self.symbols.get(leaf)) for leaf, value in result.items()) and all(
+                    abs(result[leaf]) > LEAST for leaf in self.nonzero if leaf in result):
+                return result
         return None
 
 
 def _moved(tape: Tape, moved: Sequence[Node], values: Mapping[Node, Any], digits: int) -> dict[Node, Any] | None:
-    found = dict(values)
+    result = dict(values)
     with mpmath.workdps(digits + 10):
         for _ in range(STEPS):
-            here = evaluate(tape, {leaf.args[1]: value for leaf, value in found.items()}, digits + 10)
+            here = evaluate(tape, {leaf.args[1]: value for leaf, value in result.items()}, digits + 10)
             size = max(map(abs, here["g"]), default=mpmath.mpf(0))
             if not mpmath.isfinite(size) or any(getattr(e, "imag", 0) for e in here["g"]):
                 return None
             if size < mpmath.mpf(10) ** -digits:
-                return found
+                return result
             A = here["by"].astype(float)
             if not np.isfinite(A).all():
                 return None
@@ -128,7 +128,7 @@ def _moved(tape: Tape, moved: Sequence[Node], values: Mapping[Node, Any], digits
             largest = size * float(np.abs(y).max(initial=0.0))
             step = size / max(largest, mpmath.mpf(1))
             for leaf, change in zip(moved, y, strict=True):
-                found[leaf] = mpmath.mpf(found[leaf]) - step * float(change)
+                result[leaf] = mpmath.mpf(result[leaf]) - step * float(change)
     return None
 
 

@@ -76,19 +76,19 @@ def prove_equations(equations: Equations, bound: int = BOUND) -> Proofs:
     """Decide the identities that apply to the equations.
 
     bound   terms that a product may have; claims that need more are undecided where no state refutes them"""
-    subject = _Subject(equations)
+    subject = _Quantities(equations)
     symbols = equations.printed_leaves()
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     claims = []
     for name, pairs_of in CLAIMS:
-        found = pairs_of(subject)
-        if found is not None:
-            pairs, columns = found
+        result = pairs_of(subject)
+        if result is not None:
+            pairs, columns = result
             claims.append(Claim(name, decide(equations.recorder, pairs, symbols, columns, units, bound)))
     return Proofs(f"{equations.name} ({equations.formulation})", tuple(claims))
 
 
-class _Subject:
+class _Quantities:
     """Quantities of equations as nodes, and derivatives along the motion with free accelerations."""
 
     def __init__(self, equations: Equations) -> None:
@@ -144,26 +144,26 @@ class _Subject:
         return self.moved or not all(map(is_zero, self["C_t"] if self.has("C_t") else []))
 
 
-def _symmetric(s: _Subject) -> Pairs | None:
+def _symmetric(s: _Quantities) -> Pairs | None:
     if not s.has("M_tilde"):
         return None
     M = s["M_tilde"]
     return list(zip(M.ravel(), M.T.ravel())), len(M)
 
 
-def _newton_euler(s: _Subject) -> Pairs | None:
+def _newton_euler(s: _Quantities) -> Pairs | None:
     if not s.has("M_tilde", "k_tilde", "F_tilde", "inverse_dynamics") or s.equations.implicit_loads:
         return None
     return list(zip(s["inverse_dynamics"], s.inertial - s["F_tilde"])), 1
 
 
-def _bias(s: _Subject) -> Pairs | None:
+def _bias(s: _Quantities) -> Pairs | None:
     if not s.has("bias", "k_tilde", "F_tilde"):
         return None
     return list(zip(s["bias"], s["k_tilde"] - s["F_tilde"])), 1
 
 
-def _lagrange(s: _Subject) -> Pairs | None:
+def _lagrange(s: _Quantities) -> Pairs | None:
     if not s.has("energy", "M_tilde", "k_tilde", "rates") or not s.plain or not s.q:
         return None
     T = s["energy"].ravel()[0]
@@ -172,7 +172,7 @@ def _lagrange(s: _Subject) -> Pairs | None:
     return list(zip(left, s.inertial)), 1
 
 
-def _hessian(s: _Subject) -> Pairs | None:
+def _hessian(s: _Quantities) -> Pairs | None:
     if not s.has("energy", "M_tilde"):
         return None
     T = s["energy"].ravel()[0]
@@ -180,7 +180,7 @@ def _hessian(s: _Subject) -> Pairs | None:
     return [(x, y) for row, own in zip(rows, s["M_tilde"]) for x, y in zip(row, own)], len(s.u)
 
 
-def _energy(s: _Subject) -> Pairs | None:
+def _energy(s: _Quantities) -> Pairs | None:
     """For any accelerations, what they need beyond the loads adds its power."""
     if not s.has("energy", "power", "rates", "inverse_dynamics") or s.driven or s.equations.implicit_loads:
         return None
@@ -188,7 +188,7 @@ def _energy(s: _Subject) -> Pairs | None:
     return [(rate, s["power"].ravel()[0] + inner(np.array(s.u, dtype=object), s["inverse_dynamics"]))], 0
 
 
-def _energy_on_constraints(s: _Subject) -> Pairs | None:
+def _energy_on_constraints(s: _Quantities) -> Pairs | None:
     """On C_dot = 0 and M_tilde u_dot + k_tilde + C_r^T lam = F_tilde, for any multipliers: the rate less the power is the sum of
     u_k times the k-th equation less lam_i times the i-th rate, which vanish there."""
     if not s.has("energy", "power", "rates", "inverse_dynamics", "C_r", "C_t", "C_dot", "lam") or not s.equations.constraints:
@@ -203,7 +203,7 @@ def _energy_on_constraints(s: _Subject) -> Pairs | None:
     return [(rate, power + left)], 0
 
 
-def _solved(s: _Subject) -> Pairs | None:
+def _solved(s: _Quantities) -> Pairs | None:
     """What the accelerations are solved from."""
     if not s.has("M_tilde", "k_tilde", "F_tilde", "accelerations") or s.equations.implicit_loads or len(s.u) > SPEEDS:
         return None
@@ -213,13 +213,13 @@ def _solved(s: _Subject) -> Pairs | None:
     return list(zip(left, s["F_tilde"])), 1
 
 
-def _constraints_fulfilled(s: _Subject) -> Pairs | None:
+def _constraints_fulfilled(s: _Quantities) -> Pairs | None:
     if not s.has("C_r", "F_d", "accelerations") or not s.equations.constraints or len(s.u) > SPEEDS:
         return None
     return list(zip(s["C_r"] @ s["accelerations"], s["F_d"])), 1
 
 
-def _jacobian(s: _Subject) -> Pairs | None:
+def _jacobian(s: _Quantities) -> Pairs | None:
     """J u = rate of positions; rotations turn with it: R_dot = omega x R."""
     if not s.has("J", "rates", "positions", "frames"):
         return None
@@ -239,13 +239,13 @@ def _jacobian(s: _Subject) -> Pairs | None:
     return pairs, 1
 
 
-def _coriolis(s: _Subject) -> Pairs | None:
+def _coriolis(s: _Quantities) -> Pairs | None:
     if not s.has("coriolis", "k_tilde"):
         return None
     return list(zip(s["coriolis"] @ np.array(s.u, dtype=object), s["k_tilde"])), 1
 
 
-def _skew(s: _Subject) -> Pairs | None:
+def _skew(s: _Quantities) -> Pairs | None:
     if not s.has("coriolis", "M_tilde", "rates"):
         return None
     M, C = s["M_tilde"], s["coriolis"]
@@ -253,27 +253,27 @@ def _skew(s: _Subject) -> Pairs | None:
     return list(zip(rate, (C + C.T).ravel())), len(M)
 
 
-def _constraint_rates(s: _Subject) -> Pairs | None:
+def _constraint_rates(s: _Quantities) -> Pairs | None:
     rows = [k for k, holonomic in enumerate(s.equations.holonomic) if holonomic]
     if not rows or not s.has("C", "C_dot"):
         return None
     return list(zip(s.rate(s["C"][rows]), s["C_dot"][rows])), 1
 
 
-def _constraint_jacobian(s: _Subject) -> Pairs | None:
+def _constraint_jacobian(s: _Quantities) -> Pairs | None:
     if not s.has("C_dot", "C_r") or not s.equations.constraints:
         return None
     columns = [s.by(s["C_dot"].tolist(), u) for u in s.u]
     return [(columns[j][i], s["C_r"][i, j]) for i in range(len(s["C_dot"])) for j in range(len(s.u))], len(s.u)
 
 
-def _constraint_parts(s: _Subject) -> Pairs | None:
+def _constraint_parts(s: _Quantities) -> Pairs | None:
     if not s.has("C_dot", "C_r", "C_t") or not s.equations.constraints:
         return None
     return list(zip(s["C_dot"], s["C_r"] @ np.array(s.u, dtype=object) + s["C_t"])), 1
 
 
-def _constraint_accelerations(s: _Subject) -> Pairs | None:
+def _constraint_accelerations(s: _Quantities) -> Pairs | None:
     """d C_dot / dt = C_r u_dot - F_d for any accelerations."""
     if not s.has("C_dot", "C_r", "F_d") or not s.equations.constraints:
         return None
@@ -282,14 +282,14 @@ def _constraint_accelerations(s: _Subject) -> Pairs | None:
 
 def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
     """Which of the claims exact algebra proves with products of up to QUICK terms, whatever machine it runs on."""
-    subject = _Subject(equations)
+    subject = _Quantities(equations)
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     positive = not_negative(equations.printed_leaves())
     proved = set()
     for name, pairs_of in (*CLAIMS, *SOLUTIONS):
         try:
-            found = pairs_of(subject) if name in names else None
-            if found is not None and zero(equations.recorder, found[0], QUICK, units, positive):
+            result = pairs_of(subject) if name in names else None
+            if result is not None and zero(equations.recorder, result[0], QUICK, units, positive):
                 proved.add(name)
         except UnsupportedExpression:  # such as the derivative of a function of the user without one
             continue
@@ -297,7 +297,7 @@ def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
 
 
 POWER = "rate of energy is the power of loads and moving constraints, on C_dot = 0 with multipliers"
-CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
+CLAIMS: tuple[tuple[str, Callable[[_Quantities], Pairs | None]], ...] = (
     ("M_tilde is symmetric", _symmetric),
     ("M_tilde is the second derivative of the kinetic energy by the speeds", _hessian),
     ("Newton-Euler: inverse dynamics is M_tilde u_dot + k_tilde - F_tilde", _newton_euler),
@@ -315,7 +315,7 @@ CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
 )
 
 # Quotients of determinants, which are short for few speeds.
-SOLUTIONS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
+SOLUTIONS: tuple[tuple[str, Callable[[_Quantities], Pairs | None]], ...] = (
     ("the accelerations solve the equations of motion", _solved),
     ("the accelerations fulfil C_r u_dot = F_d", _constraints_fulfilled),
 )

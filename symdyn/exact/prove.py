@@ -148,7 +148,7 @@ def _prove(a: Any, b: Any, on: Any) -> Proof:
     letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
     if letters:
         return Proof(False, reason=f"the sides differ unless {shown(letters[0])} has a certain value; take it with .doit()")
-    return replace(proof, reason=_told(proof, left, right))
+    return replace(proof, reason=_with_difference(proof, left, right))
 
 
 def _fulfilled(recorder: Recorder, relations: Sequence[Node], symbols: Mapping[Node, sp.Expr]) -> bool:
@@ -179,7 +179,7 @@ def _proved_with_exponentials(left: Sequence[sp.Expr], right: Sequence[sp.Expr])
     return letters is not None and not any(unproved(list(zip(letters[:len(left)], letters[len(left):]))))
 
 
-def _told(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
+def _with_difference(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
     """How the sides differ, with symbols of one side only, and those of one name that are not the same, of which the one in b is
     printed with a stroke."""
     if all(e == 0 for e in right):
@@ -406,14 +406,14 @@ def rounded_directions(entries: Sequence[Any]) -> list[tuple[Fraction, ...]]:
     """Two or three numbers each, without signs, whose squares add up to one but for rounding at sixty digits."""
     left = sorted({abs(a) for node in reachable(entries) for a in node.args
                    if isinstance(a, Fraction) and LONG[0] < a.denominator < LONG[1] and abs(a) < 1}, reverse=True)
-    found: list[tuple[Fraction, ...]] = []
+    result: list[tuple[Fraction, ...]] = []
     for size in (2, 3):
         for group in combinations(left, size):
             off = abs(sum((a * a for a in group), Fraction(-1)))
             if 0 < off < UNIT and all(a in left for a in group):
-                found.append(group)
+                result.append(group)
                 left = [a for a in left if a not in group]
-    return found
+    return result
 
 
 def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: Sequence[int],
@@ -436,10 +436,10 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
             values = reached
         tried = values
         try:
-            found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
+            result = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
         except TypeError:  # complex numbers have no order: a comparison is not defined at this state
             continue
-        rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
+        rows = [(place, x, y) for place, (x, y) in enumerate(zip(result["left"], result["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
         largest = max((abs(x) + abs(y) for _, x, y in rows), default=0)
         apart = [(place, abs(x - y)) for place, x, y in rows

@@ -16,7 +16,7 @@ TERMS, TRIED = 150, 60
 
 def relations_in_letters(numerators: Sequence[Any], bases: Sequence[Basis], letters: Letters) -> list[Polynomial]:
     """Relations as polynomials in letters, in each representation, and in axes that are turned by the angles in them."""
-    found: list[Polynomial] = []
+    result: list[Polynomial] = []
     series: list[Polynomial] = []
     for num in numerators:
         if not 1 < len(num) <= TERMS:
@@ -26,10 +26,10 @@ def relations_in_letters(numerators: Sequence[Any], bases: Sequence[Basis], lett
         if waves is not None:
             series.append(waves)
             own.append(contracted(waves, letters))
-        found += [form for p in own for form in (p, contracted(p, letters))]
-    found += [turned for one, other in combinations(series, 2) for turned in _turned(one, other, letters)]
+        result += [form for p in own for form in (p, contracted(p, letters))]
+    result += [turned for one, other in combinations(series, 2) for turned in _turned(one, other, letters)]
     unique: dict[frozenset, Polynomial] = {}
-    for p in sorted(found, key=len):
+    for p in sorted(result, key=len):
         unique.setdefault(frozenset(p.items()), p)
     return [p for p in unique.values() if 1 < len(p) <= TERMS][:TRIED]
 

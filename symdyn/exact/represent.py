@@ -287,7 +287,7 @@ def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, int]]:
                 for what, v, sign in made:
                     after[what, v] = after.get((what, v), 0) + sign * c
             parts = after
-    found: dict[Monomial, int] = {}
+    result: dict[Monomial, int] = {}
     for (kind, vector), c in parts.items():
         if not any(vector):
             m: Monomial = ()
@@ -296,8 +296,8 @@ def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, int]]:
         else:
             letter, sign = letters.of(kind, vector)
             m, c = ((letter, 1),), sign * c
-        found[m] = found.get(m, 0) + c
-    return [(m, c) for m, c in found.items() if c]
+        result[m] = result.get(m, 0) + c
+    return [(m, c) for m, c in result.items() if c]
 
 
 def contracted(p: Polynomial, letters: Letters) -> Polynomial:
@@ -353,9 +353,9 @@ def _theorems(m: Monomial, letters: Letters) -> Theorems:
     for x, _ in trig:
         for y, _ in trig:
             # Cosines once a pair; a sine first.
-            found = None if x == y or (x > y and turns[x][0] == "cos") else letters.partner(x, y)
-            if found is not None:
-                one, two, same, opposite = found
+            result = None if x == y or (x > y and turns[x][0] == "cos") else letters.partner(x, y)
+            if result is not None:
+                one, two, same, opposite = result
                 rest = _less(_less(m, x, 1), y, 1)
                 other_term = multiplied(rest, ((one, 1), (two, 1)) if one < two else ((two, 1), (one, 1)))
                 sums.append(((x, y), rest, other_term, same, opposite))

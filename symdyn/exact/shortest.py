@@ -159,12 +159,12 @@ class Writer:
 
     def _function(self, atom: Atom) -> Any:
         if atom.op == "call":
-            kernel, *arguments = atom.args
+            intrinsic, *arguments = atom.args
             given = [self._argument(a) for a in arguments]
-            if isinstance(kernel, UserFunction):
-                return kernel.applied(given)[atom.item or 0]
-            if kernel.letters:
-                return sp.Function(kernel.letters[atom.item or 0])(*given)
+            if isinstance(intrinsic, UserFunction):
+                return intrinsic.applied(given)[atom.item or 0]
+            if intrinsic.letters:
+                return sp.Function(intrinsic.letters[atom.item or 0])(*given)
             raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
                                         "the right side instead")
         return applied(atom.op, [self._argument(a) for a in atom.args])
@@ -235,14 +235,14 @@ class Writer:
             base = plain(value.num)
             series = self._over(fourier(base, self.letters) or base, value)
             return a.grouped(series, ("position",), a.factored) or a.factored(series)
-        found = self.representations(value)
-        least = min(map(len, found))
-        found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
+        result = self.representations(value)
+        least = min(map(len, result))
+        result = sorted([p for p in result if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
-            found = found[:2]
+            result = result[:2]
         else:
-            found += [p for p in (halved(p, self.letters) for p in found) if p is not None]
-        trees = [tree for p in found for tree in self._arranged(p)]
+            result += [p for p in (halved(p, self.letters) for p in result) if p is not None]
+        trees = [tree for p in result for tree in self._arranged(p)]
         if value.under:
             # The denominator below all of it, which leaves factors of the numerator whole.
             (below, sign), = self._over({(): 1}, value).items()
@@ -270,33 +270,33 @@ class Writer:
         """Different polynomials in letters for the same value."""
         num, letters = value.num, self.letters
         base = plain(num)
-        found = [base]
+        result = [base]
         if any(letter in letters.turns for m in base for letter, _ in m):
             others = [basis.plain(basis.of(num), letters) for basis in self.bases]
             if len(num) > LONG:
-                found = [contracted(min(others, key=len), letters)]
+                result = [contracted(min(others, key=len), letters)]
             else:
                 for p in others:
-                    found += [p, contracted(p, letters)]
+                    result += [p, contracted(p, letters)]
                 series = fourier(base, letters)
                 if series is not None:
-                    found += [series, contracted(series, letters)]
+                    result += [series, contracted(series, letters)]
                 if len(base) <= SHORT:
-                    found.append(contracted(base, letters))
-        found += [shortened(p, self._zeros) for p in found if self._zeros]
+                    result.append(contracted(base, letters))
+        result += [shortened(p, self._zeros) for p in result if self._zeros]
         if value.under:
-            found = [self._over(p, value) for p in found]
-            found += self._parts(value)
-            found += [with_tangents(p, letters) for p in found]
+            result = [self._over(p, value) for p in result]
+            result += self._parts(value)
+            result += [with_tangents(p, letters) for p in result]
         unique: dict[frozenset, Polynomial] = {}
-        for p in found:
+        for p in result:
             unique.setdefault(frozenset(p.items()), p)
         return list(unique.values())
 
     def _parts(self, value: Value) -> list[Polynomial]:
         """num / (f g) as q / g + r / (f g), for each factor that the numerator holds a part of."""
         ring = self.exact.ring
-        found = []
+        result = []
         for k, n in value.under:
             factor = ring.factors[k]
             if len(factor) == 1 or n > 1:
@@ -307,8 +307,8 @@ class Writer:
                 p = self._over(contracted(plain(rest), self.letters), value)
                 for m, c in self._over(contracted(plain(quotient), self.letters), Value(quotient, others)).items():
                     p[m] = p.get(m, 0) + c
-                found.append({m: c for m, c in p.items() if c})
-        return found
+                result.append({m: c for m, c in p.items() if c})
+        return result
 
     def _arranged(self, p: Polynomial) -> list[Tree]:
         a = self.arranger
@@ -449,22 +449,22 @@ def apart(output: Output, symbols: Mapping[Node, sp.Expr], zeros: Sequence[Any] 
     """An output as `explicit` gives it, entry by entry, those of few operations first, until the bounds on terms are reached;
     from there on as derived."""
     sizes = written_out(output.entries)
-    found: list[Any] = [None] * len(output.entries)
+    result: list[Any] = [None] * len(output.entries)
     left = TERMS
-    for k in sorted(range(len(found)), key=lambda k: sizes.get(output.entries[k], 0)):
+    for k in sorted(range(len(result)), key=lambda k: sizes.get(output.entries[k], 0)):
         entry = output.entries[k]
         try:
             terms = sum(len(value.num) for value in Exact([entry], positive=not_negative(symbols)).values)
             if terms > left:
                 raise TooLarge(f"it has {terms:,} terms")
-            found[k], = written([entry], symbols, zeros=zeros)
+            result[k], = written([entry], symbols, zeros=zeros)
             left -= terms
         except (TooLarge, ZeroDivisionError):
-            found[k] = expand(Output.of("entry", entry), symbols)
+            result[k] = expand(Output.of("entry", entry), symbols)
     if output.shape == ():
-        return found[0]
+        return result[0]
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
-    return sp.Matrix(rows, columns, found)
+    return sp.Matrix(rows, columns, result)
 
 
 def not_negative(symbols: Mapping[Node, sp.Expr]) -> set[Node]:
@@ -551,14 +551,14 @@ def _is_root_of_square(e: Any) -> bool:
 def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, least: float) -> tuple[sp.Expr, int]:
     """As it stands on the tape, and its operations; where these are few and come near to `least`, those of another form, common
     factors are taken out of sums if that is shorter."""
-    found = expand(Output.of("entry", entry), symbols)
+    result = expand(Output.of("entry", entry), symbols)
     if any(node.op == "sqrt" and _is_square(node.args[0]) for node in reachable([entry])):
-        found = found.replace(_is_root_of_square, lambda root: sp.Abs(root.base.base) ** (2 * root.exp))
-    count = int(sp.count_ops(found))
+        result = result.replace(_is_root_of_square, lambda root: sp.Abs(root.base.base) ** (2 * root.exp))
+    count = int(sp.count_ops(result))
     if size > FACTOR_TERMS or count > NEAR * least:
-        return found, count
-    taken, other = _taken_out(found), _taken_out(found, numbers=True)
-    forms = [(found, count), *map(_counted, [e for e in dict.fromkeys((other, _number_out(other), taken)) if e != found])]
+        return result, count
+    taken, other = _taken_out(result), _taken_out(result, numbers=True)
+    forms = [(result, count), *map(_counted, [e for e in dict.fromkeys((other, _number_out(other), taken)) if e != result])]
     return min(forms, key=lambda form: form[1])
 
 

@@ -30,15 +30,15 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
     """
     expressions = [_taken(e) for e in expressions]
     same = same or {}
-    found: set[Any] = {part for part in parts_of(*expressions) if isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral))}
-    found = found.union(*map(symbols_of, expressions))
+    result: set[Any] = {part for part in parts_of(*expressions) if isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral))}
+    result = result.union(*map(symbols_of, expressions))
     recorder = Recorder()
     leaves: dict[sp.Basic, Any] = {}
     symbols: dict[Node, sp.Expr] = {}
-    for k, symbol in enumerate(sorted({same.get(symbol, symbol) for symbol in found}, key=ordered)):
+    for k, symbol in enumerate(sorted({same.get(symbol, symbol) for symbol in result}, key=ordered)):
         leaf = recorder.leaf(f"x{k}", _kind(symbol))
         leaves[symbol], symbols[leaf] = leaf, symbol
-    leaves |= {symbol: leaves[same[symbol]] for symbol in found if symbol in same}
+    leaves |= {symbol: leaves[same[symbol]] for symbol in result if symbol in same}
     memory: dict[sp.Basic, Any] = {}
     return [record_expression(recorder, e, leaves, memory) for e in expressions], symbols
 

@@ -38,7 +38,7 @@ _TRUTH = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """A function that is no polynomial: its operation and arguments (values, truths, or a kernel first); item: one of its
+    """A function that is no polynomial: its operation and arguments (values, truths, or an intrinsic first); item: one of its
     results."""
 
     op: str
@@ -61,7 +61,7 @@ class Exact:
         """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters; positive: leaves that are not
         negative, so that roots of their squares are themselves; directions: groups of positive numbers that are taken as any
         numbers whose squares add up to one, also in products of two of them; of_calls: whether results of algorithms are
-        expressed by each other where they can be (Kernel.by_others).
+        expressed by each other where they can be (Intrinsic.by_others).
 
         Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
@@ -87,10 +87,10 @@ class Exact:
         number_of = {leaf: k for k, leaf in self.leaves.items()}
         for first, *others in groups:
             ring.relate(number_of[first], 1 - sum(ring.generators[number_of[leaf]] ** 2 for leaf in others))
-        place = count + len(leaves)
+        index = count + len(leaves)
         for direction in directions:
-            ring.relate(place, 1 - sum(ring.generators[place + k] ** 2 for k in range(1, len(direction))))
-            place += len(direction)
+            ring.relate(index, 1 - sum(ring.generators[index + k] ** 2 for k in range(1, len(direction))))
+            index += len(direction)
             for a, b in combinations_with_replacement(direction, 2):
                 taken_as[a * b] = ring.mul(taken_as[a], taken_as[b])
                 if a == b:
@@ -123,8 +123,8 @@ class Exact:
             return result
 
         def of_call(args: tuple[Any, ...], item: int) -> Value:
-            kernel, *values = args
-            found = kernel.by_others(item) if of_calls else None
+            intrinsic, *values = args
+            found = intrinsic.by_others(item) if of_calls else None
             if found is None or not len(values[found[0]].num):
                 return of_atom(Atom("call", args, item))
             total = ring.zero
@@ -283,20 +283,20 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: 
     # What is left of the number, and its sign, which stays with what may be negative.
     left = abs(number.numerator) * number.denominator // root**2
     rest = ring.context.constant(1 if number > 0 else -1)
-    found = []
+    result = []
     for factor, n in sorted(parts, key=lambda part: str(part[0])):
         if _never_negative(factor, positive):
             outside = ring.mul(outside, Value(ring.reduced(factor ** (int(n) // 2))))
-            found += [Value(factor)] * (int(n) % 2)
+            result += [Value(factor)] * (int(n) % 2)
         else:
             size = ring.mul(size, Value(ring.reduced(factor ** (int(n) // 2))))
             rest = ring.reduced(rest * factor ** (int(n) % 2))
-    found += [ring.number(prime) for prime, _ in _factors(left)]
+    result += [ring.number(prime) for prime, _ in _factors(left)]
     if not rest.is_one() or under:
-        found.append(Value(rest, tuple(under)))
-    while len(found) > most:
-        found[-2:] = [ring.mul(*found[-2:])]
-    return outside, found, size
+        result.append(Value(rest, tuple(under)))
+    while len(result) > most:
+        result[-2:] = [ring.mul(*result[-2:])]
+    return outside, result, size
 
 
 def never_zero(p: Any, positive: Collection[int]) -> bool:
@@ -318,11 +318,11 @@ def _factors(n: int) -> list[tuple[int, int]]:
     """Primes of a positive number and their powers; of a long one what is left without the small primes is no prime."""
     if n.bit_length() <= _BITS:
         return [(int(prime), int(power)) for prime, power in fmpz(n).factor()]
-    found = []
+    result = []
     for prime in _PRIMES:
         power = 0
         while n % prime == 0:
             n, power = n // prime, power + 1
-        found += [(prime, power)] * (power > 0)
+        result += [(prime, power)] * (power > 0)
     root = isqrt(n)
-    return [*found, *([(root, 2)] if root**2 == n else [(n, 1)])]
+    return [*result, *([(root, 2)] if root**2 == n else [(n, 1)])]

@@ -63,16 +63,16 @@ class Beam:
             faults.append(f"integration is {shown(integration)}; pass 'exact' or 'stations'")
         if not _whole(draw, 2) or draw > _MOST_DRAWN:
             faults.append(f"draw is {shown(draw)}; pass a whole number of stations, 2 or more, {_MOST_DRAWN} at most")
-        found = table(stations, mass_per_length, stiffness, twist, length, faults)
-        self._scale = 1.0 if length is None or found is None else found.length
+        result = table(stations, mass_per_length, stiffness, twist, length, faults)
+        self._scale = 1.0 if length is None or result is None else result.length
         count = int(shapes) if isinstance(shapes, (int, np.integer)) and _whole(shapes, 1) else None
-        given = [] if count is not None else self._shapes(shapes, None if found is None else found.length / self._scale, faults)
+        given = [] if count is not None else self._shapes(shapes, None if result is None else result.length / self._scale, faults)
         if count is not None and count > _MOST_MODES:
             faults.append(f"shapes asks for {count} modes; at most {_MOST_MODES} are computed")
         n = min(count, _MOST_MODES) if count is not None else len(given)
         self._ratios = _ratios(damping_ratio, n, faults)
         self._raise(faults)
-        self.table: Table = found  # type: ignore[assignment]  # without faults there is one
+        self.table: Table = result  # type: ignore[assignment]  # without faults there is one
         self._draw = draw
         self.shapes = tuple(self.modes(count) if count is not None else given)
         self._raise(self._dependent())

@@ -41,7 +41,7 @@ class Motion:
     """
 
     rows: Sequence[Any] = ()
-    lockable: Collection[int] = ()
+    vanishing_pivots: Collection[int] = ()
 
     def __init__(self, algebra: TapeAlgebra, coordinates: Sequence[sp.Symbol], speeds: Sequence[sp.Symbol],
                  rates: Sequence[Any], states: Sequence[tuple[sp.Symbol, sp.Expr]], inputs: Sequence[sp.Symbol],
@@ -105,7 +105,7 @@ class Motion:
         """The mass matrix, factorized."""
         M = self.recall("M_tilde")
         with self.algebra.section("factors of the mass matrix, L^T D L"):
-            least = dict.fromkeys(self.lockable, self.algebra.rounding)
+            least = dict.fromkeys(self.vanishing_pivots, self.algebra.rounding)
             return factorize(self.algebra, M, self.reasons(), least=least, sizes=self.sizes_of_pivots() if least else {})
 
     def accelerations(self) -> np.ndarray:

@@ -141,9 +141,9 @@ def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
 def curvature_named(name: str) -> tuple[str, tuple[str, ...]] | None:
     """What a function of this name differentiates twice, weighted, and by what: constraints_hessian_x_params,
     outputs_hessian_x_inputs; None for other functions."""
-    of, found, by = name.partition("_hessian_")
+    of, result, by = name.partition("_hessian_")
     wrt = tuple(by.split("_"))
-    return (of, wrt) if found and of in CURVED and wrt == tuple(one for one in WEIGHTED if one in wrt) else None
+    return (of, wrt) if result and of in CURVED and wrt == tuple(one for one in WEIGHTED if one in wrt) else None
 
 
 def curved(equations: Equations, of: str) -> list[Any]:

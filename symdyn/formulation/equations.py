@@ -113,7 +113,7 @@ class Equations(EquationsFacade):
     holonomic: tuple[bool, ...] = ()
     bodies: tuple[str, ...] = ()
     joints: tuple[tuple[str, str, str, str], ...] = ()
-    otherwise: Equations | None = None
+    singular_fallback: Equations | None = None
     drawn: tuple[Mapping[str, Any], ...] = ()
     surroundings: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()

@@ -27,7 +27,7 @@ def enclosed(equations: Equations) -> list[bool]:
     """Which events can be enclosed."""
     if not equations.events:
         return []
-    ways = [equations] if equations.otherwise is None else [equations, equations.otherwise]
+    ways = [equations] if equations.singular_fallback is None else [equations, equations.singular_fallback]
     return [all(encloses(way.recorder, way.quantity("events")[k]) for way in ways) for k in range(len(equations.events))]
 
 
@@ -39,7 +39,7 @@ def unproved(equations: Equations) -> list[str]:
 
 
 def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
-    found, known = set(), dict[sp.Basic, bool]()
+    result, known = set(), dict[sp.Basic, bool]()
 
     def is_fixed(part: sp.Basic) -> bool:
         """Whether parameters alone stand in it; parts that stand in many others are looked at once."""
@@ -51,16 +51,16 @@ def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
         if is_fixed(part):
             continue
         if isinstance(part, sp.Pow) and not (part.exp.is_number and part.exp.is_positive):
-            found.add("a quotient" if part.exp.is_number else "a power")
+            result.add("a quotient" if part.exp.is_number else "a power")
         elif isinstance(part, sp.Function) and not isinstance(part, (*_EVEN, AppliedUndef, Result)):
-            found.add(str(part.func))
-    return f"{', '.join(sorted(found))} of what is only sampled" if found else ""
+            result.add(str(part.func))
+    return f"{', '.join(sorted(result))} of what is only sampled" if result else ""
 
 
 def event_leaves(equations: Equations) -> list[int]:
     """What the events that can be enclosed depend on: 0 for t, then the entries of x = [q; u; z], then the inputs."""
     places = {name: k for k, name in enumerate(_leaf_names(equations))}
-    ways = [equations] if equations.otherwise is None else [equations, equations.otherwise]
+    ways = [equations] if equations.singular_fallback is None else [equations, equations.singular_fallback]
     values = [entry for way in ways for entry in _values(way, enclosed(equations))]
     return sorted({places[leaf.args[1]] for leaf in _moving(values)})
 
@@ -82,10 +82,10 @@ def event_bounds(equations: Equations, name: str) -> Tape:
         return Jet(*[Interval(*ends[k:k + 2]) for k in (0, 2, 4)])
 
     with recorder.section("bounds of the events"):
-        found = iter(enclosures(recorder, values, {leaf: jet(leaf) for leaf in _moving(values)}, rounded=name == RANGES))
+        result = iter(enclosures(recorder, values, {leaf: jet(leaf) for leaf in _moving(values)}, rounded=name == RANGES))
         rows = np.zeros((len(can), 6), dtype=object)
         for k in np.flatnonzero(can):
-            rows[k] = [end for interval in next(found) for end in interval]
+            rows[k] = [end for interval in next(result) for end in interval]
     return Tape.of(recorder, **{name: rows if name == BOUNDS else rows[:, :2]})
 
 
@@ -103,9 +103,9 @@ def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
         own = [a for a in node.args[:1] if isinstance(a, UserFunction)]
         solved = not own and (node.op in ("call", "guard") or node in recorder.checks)
         known[node] = frozenset() if solved else frozenset(own).union(*{known[a] for a in node.args if isinstance(a, Node)})
-    found = [known.get(entry, frozenset()) for entry in values]
+    result = [known.get(entry, frozenset()) for entry in values]
     return [(sorted(one for one in names if isinstance(one, str)),
-             sorted({one.signature for one in names if not isinstance(one, str)})) for names in found]
+             sorted({one.signature for one in names if not isinstance(one, str)})) for names in result]
 
 
 def _leaf_names(equations: Equations) -> list[str]:

@@ -68,13 +68,13 @@ class Varied:
         """See above."""
         motion = self.motion
         with self.algebra.section("balance of forces, constraints and rates of the extra states"):
-            found = self.statics()
+            result = self.statics()
         with self.algebra.section("first and second derivatives by time of constraints and coordinates"):
             second = [sum((c * ud for c, ud in zip(row.jacobian, motion.speed_rates, strict=True)), row.remaining)
                       for row in motion.rows]
             by_time = {**motion.by_time(), **dict(zip(self._leaves(motion.speeds), motion.speed_rates, strict=True))}
             accelerations = forward(self.recorder, motion.rates, by_time)
-            return vector(*found, *[row.rate for row in motion.rows], *second, *motion.rates, *accelerations)
+            return vector(*result, *[row.rate for row in motion.rows], *second, *motion.rates, *accelerations)
 
     def by(self, values: np.ndarray, leaves: Sequence[Any]) -> np.ndarray:
         """Derivatives (len(values), len(leaves)); column by column: speeds and coordinates move what comes after them only."""

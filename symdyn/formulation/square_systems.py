@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.constraints.saddle import KernelSolver
+from symdyn.formulation.constraints.saddle import IntrinsicSolver
 from symdyn.spatial.vectors import cross, inner, vector, zeros
 from symdyn.tape.node import Node, is_zero
 
@@ -63,7 +63,7 @@ class SquareSystem:
 
     def _numeric(self, rows: list[int], columns: list[int], right: np.ndarray) -> np.ndarray:
         n = len(rows)
-        solver = KernelSolver(self.algebra, zeros(n, n), self.A[np.ix_(rows, columns)], vector(*[1] * n), [1] * n, self.reason)
+        solver = IntrinsicSolver(self.algebra, zeros(n, n), self.A[np.ix_(rows, columns)], vector(*[1] * n), [1] * n, self.reason)
         return solver.solve(zeros(n), right)[0]
 
 

@@ -108,10 +108,10 @@ def _worst(R: sp.ImmutableMatrix, points: dict[str, np.ndarray]) -> str:
     if errors[k] <= TOLERANCE and abs(dets[k] - 1) <= 10 * TOLERANCE:
         return ""
     at = ", ".join(f"{name} = {x[k]:.4g}" for name, x in points.items())
-    found = f"R R^T differs from the identity by {errors[k]:.3g} and det R = {dets[k]:.6g}" + (f" at {at}" if at else "")
+    result = f"R R^T differs from the identity by {errors[k]:.3g} and det R = {dets[k]:.6g}" + (f" at {at}" if at else "")
     if errors[k] <= TOLERANCE:
-        return f"{found}, so that it mirrors; exchange two columns or change the sign of one"
-    return f"{found}; pass a matrix with orthonormal columns, such as sd.rotation.about('Z', phi)"
+        return f"{result}, so that it mirrors; exchange two columns or change the sign of one"
+    return f"{result}; pass a matrix with orthonormal columns, such as sd.rotation.about('Z', phi)"
 
 
 def _square(value: Any) -> bool:

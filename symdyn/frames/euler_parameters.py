@@ -39,7 +39,7 @@ def _parameters(R: sp.ImmutableMatrix) -> list[sp.Expr] | None:
     if len(symbols) != 4 or not all(isinstance(s, Coordinate) for s in symbols):
         return None
     stream = random.Random(2)
-    found: list[tuple[int, int]] = []
+    result: list[tuple[int, int]] = []
     for _ in range(3):
         values = np.array([stream.uniform(0.2, 0.9) for _ in symbols])
         values /= np.linalg.norm(values)
@@ -50,10 +50,10 @@ def _parameters(R: sp.ImmutableMatrix) -> list[sp.Expr] | None:
             return None
         e = np.array([numbers[2, 1] - numbers[1, 2], numbers[0, 2] - numbers[2, 0], numbers[1, 0] - numbers[0, 1]]) / (4 * e0)
         order = [match for component in (e0, *e) for match in _matches(component, values)]
-        if len(order) != 4 or len({k for k, _ in order}) != 4 or found not in ([], order):
+        if len(order) != 4 or len({k for k, _ in order}) != 4 or result not in ([], order):
             return None
-        found = order
-    return [sign * symbols[k] for k, sign in found]
+        result = order
+    return [sign * symbols[k] for k, sign in result]
 
 
 def _matches(component: float, values: np.ndarray) -> list[tuple[int, int]]:

@@ -71,8 +71,8 @@ class _Parts:
         >>> b.point("P", [1, 0, 0]).velocity_parts(components=b).at({q: 0.0, q.dot: 3.0}).transport
         array([0., 3., 0.])
         """
-        found: dict[str, Any] = {name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()}
-        return replace(self, **found)
+        result: dict[str, Any] = {name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()}
+        return replace(self, **result)
 
     def _readable(self) -> dict[str, Any]:
         parts = {**self._named(), "total": self.total}

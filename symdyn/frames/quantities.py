@@ -65,8 +65,8 @@ class Quantities:
         """Pairs of mass and position."""
         m, r = _rows(masses), _rows(positions)
         if not m or r is None or len(m) != len(r):
-            found = ["no list" if x is None else f"{len(x)} entries" for x in (m, r)]
-            self.faults.append(f"{self.where}: masses: {found[0]}, positions: {found[1]}; pass lists of one length, a position "
+            result = ["no list" if x is None else f"{len(x)} entries" for x in (m, r)]
+            self.faults.append(f"{self.where}: masses: {result[0]}, positions: {result[1]}; pass lists of one length, a position "
                                "of three components for each mass")
             return []
         return [(self.scalar(f"mass {k + 1}", mass, least=0, unit="kg"), self.vector(f"position {k + 1}", position))
@@ -84,11 +84,11 @@ class Quantities:
         if any(symbols_of(e) for e in I):
             return
         moments = np.linalg.eigvalsh(np.array(I.tolist(), dtype=float))
-        found = f"{self.where}: {what} has the principal moments {', '.join(f'{m:.6g}' for m in moments)} kg m^2"
+        result = f"{self.where}: {what} has the principal moments {', '.join(f'{m:.6g}' for m in moments)} kg m^2"
         if moments[0] < -ROUNDING * scale:
-            self.faults.append(f"{found}, one is negative; no body has them")
+            self.faults.append(f"{result}, one is negative; no body has them")
         elif moments[0] + moments[1] < moments[2] * (1 - ROUNDING):
-            warnings.warn(f"{found}, the largest is more than the other two together; no body in space has them",
+            warnings.warn(f"{result}, the largest is more than the other two together; no body in space has them",
                           ModelWarning, stacklevel=4)
 
     def demand_none(self) -> None:

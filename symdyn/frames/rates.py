@@ -43,8 +43,8 @@ def rate(value: Any) -> Any:
         shape, entries = _listed(value)
     else:
         return differentiated([taken("the expression to differentiate", value)])[0]
-    found = [taken(f"entry {k + 1} of the matrix to differentiate", e) for k, e in enumerate(entries)]
-    return sp.Matrix(*shape, differentiated(found))
+    result = [taken(f"entry {k + 1} of the matrix to differentiate", e) for k, e in enumerate(entries)]
+    return sp.Matrix(*shape, differentiated(result))
 
 
 def taken(what: str, value: Any) -> sp.Expr:

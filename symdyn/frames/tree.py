@@ -91,8 +91,9 @@ def demand_frames(**given: Any) -> None:
     if not faults:
         roots = {id(value.path[0]): value.path[0] for value in given.values()}
         if len(roots) > 1:
-            found = ", ".join(f"{what} {shown(value.name)} hangs on {shown(value.path[0].name)}" for what, value in given.items())
-            faults = [f"frames of different trees do not know how they move relative to each other: {found}; make all frames "
+            result = ", ".join(f"{what} {shown(value.name)} hangs on {shown(value.path[0].name)}"
+                               for what, value in given.items())
+            faults = [f"frames of different trees do not know how they move relative to each other: {result}; make all frames "
                       "with .frame(...) from one first frame"]
     if faults:
         raise ArgumentError("; ".join(faults))

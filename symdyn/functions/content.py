@@ -52,19 +52,19 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     columns      decides which of these are directional derivatives, several columns at once; None: none of them
     """
     symbols = equations.symbols
-    found = {name: columns(equations, name, right_side) for name in names} if columns is not None else {}
-    several = {name: made for name, made in found.items() if made is not None}
+    result = {name: columns(equations, name, right_side) for name in names} if columns is not None else {}
+    several = {name: made for name, made in result.items() if made is not None}
     one_by_one = tapes_of(equations, [n for n in names if n not in several], right_side)
     tapes = {n: several[n].tape if n in several else one_by_one[n] for n in names}
-    if equations.otherwise is not None:
-        there = tapes_of(equations.otherwise, names, right_side)
+    if equations.singular_fallback is not None:
+        there = tapes_of(equations.singular_fallback, names, right_side)
         differ = {n: t for n, t in there.items() if n in several or _entries(t) != _entries(tapes[n])}
         tapes |= {f"{n} otherwise": t for n, t in differ.items()}
     folded = {**bound, **(dict.fromkeys(closed_names(equations), 0.0) if right_side.open_contacts else {})}
     if folded:
         tapes = _together(tapes, lambda whole: specialize(whole, folded))
     tapes = _together(tapes, balance)
-    otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
+    singular_fallback = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
                     *column_names(symbols, right_side.sensitivities)],
@@ -77,7 +77,7 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
-                   [[q.name for q in group] for group in equations.unit_groups], otherwise,
+                   [[q.name for q in group] for group in equations.unit_groups], singular_fallback,
                    event_records(equations) if "events" in names else (),
                    _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
                    len(right_side.sensitivities), None if right_side.adjoint is None else len(right_side.adjoint),

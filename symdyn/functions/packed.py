@@ -20,7 +20,7 @@ _found: WeakKeyDictionary[Equations, Places | None] = WeakKeyDictionary()
 def places(equations: Equations) -> Places | None:
     """Where x_dot depends on x, by the statements; None where a numeric algorithm solves for some of it, at some states."""
     if equations not in _found:
-        _found[equations] = None if equations.otherwise is not None else _looked_for(equations)
+        _found[equations] = None if equations.singular_fallback is not None else _looked_for(equations)
     return _found[equations]
 
 
@@ -35,9 +35,9 @@ def _looked_for(equations: Equations) -> Places | None:
             if isinstance(a, Node):
                 bits[node] |= bits[a]
     needs = [bits[e] if isinstance(e, Node) else 0 for e in entries]
-    found = [[k for k, bit in enumerate(reversed(bin(need)[2:])) if bit == "1"] for need in needs]
-    rows = np.repeat(np.arange(len(entries)), [len(row) for row in found])
-    return Places(len(entries), rows, np.array([k for row in found for k in row], dtype=int))
+    result = [[k for k, bit in enumerate(reversed(bin(need)[2:])) if bit == "1"] for need in needs]
+    rows = np.repeat(np.arange(len(entries)), [len(row) for row in result])
+    return Places(len(entries), rows, np.array([k for row in result for k in row], dtype=int))
 
 
 def packed_tape(equations: Equations) -> Tape:

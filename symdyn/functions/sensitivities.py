@@ -111,15 +111,15 @@ def adjoint_tape_of(equations: Equations, name: str, by: Sequence[str]) -> Tape:
     n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
     given = [s.name for s in (*symbols.inputs, *symbols.parameters)]
     if name == ADJOINT:
-        found = list(equations.quantity("adjoint"))
+        result = list(equations.quantity("adjoint"))
     else:
         leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(symbols)]
         moved = _with(equations, "corrected_variation", _normal(equations, {"x": leaves[:n_x], "by": leaves[n_x:]}))
         n_qu = len(moved)
         weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(n_x)]
         total = sum((w * e for w, e in zip(weights, [*moved, *leaves[n_qu:n_x]], strict=True)), 0)
-        found = reverse(recorder, total, leaves)
-    return _tape(equations, name, vector(*found[:n_x], *[found[n_x + given.index(one)] for one in by]))
+        result = reverse(recorder, total, leaves)
+    return _tape(equations, name, vector(*result[:n_x], *[result[n_x + given.index(one)] for one in by]))
 
 
 def _tape(equations: Equations, name: str, values: np.ndarray) -> Tape:

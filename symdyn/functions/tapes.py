@@ -45,9 +45,9 @@ def has_function(equations: Equations, name: str) -> bool:
     twice = curvature_named(name)
     if twice is not None:
         return "C_dot" in equations.quantities if twice[0] == "constraints" else has_function(equations, "outputs")
-    found = derivative_named(name)
-    if found is not None and name not in equations.quantities:
-        return found[0] in ALL and derivative_named(found[0]) is None and has_function(equations, found[0])
+    result = derivative_named(name)
+    if result is not None and name not in equations.quantities:
+        return result[0] in ALL and derivative_named(result[0]) is None and has_function(equations, result[0])
     if name == "outputs":
         return any(q.startswith("output_") for q in equations.quantities)
     if name == "switches":
@@ -88,10 +88,10 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
     twice = curvature_named(name)
     if twice is not None:
         return Tape(equations.recorder, {name: Output.of(name, curvature(equations, *twice))})
-    found = derivative_named(name)
-    if found is not None and name not in equations.quantities:
-        differentiated = _only_output(tape_as_derived(equations, found[0])).array()
-        return Tape.of(equations.recorder, **{name: derivative(equations, differentiated, found[1])})
+    result = derivative_named(name)
+    if result is not None and name not in equations.quantities:
+        differentiated = _only_output(tape_as_derived(equations, result[0])).array()
+        return Tape.of(equations.recorder, **{name: derivative(equations, differentiated, result[1])})
     if name != "outputs":
         return equations.tape(quantity_of(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
@@ -137,10 +137,10 @@ def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Co
     second = second_named(name)
     if second is not None and second[0] == "hessian":
         return _columns_of_hessian(equations, name, second[1])
-    found = _JACOBIANS.get(name) or derivative_named(name)
-    if found is None or second is not None:
+    result = _JACOBIANS.get(name) or derivative_named(name)
+    if result is None or second is not None:
         return None
-    of, by = found
+    of, by = result
     stabilized = right_side.baumgarte and name == "jacobian_x"
     values = equations.quantity("rhs_baumgarte") if stabilized else _only_output(tape_as_derived(equations, of)).array()
     entries = values.ravel().tolist()

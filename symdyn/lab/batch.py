@@ -25,7 +25,7 @@ from symdyn.lab.peers.benchmark import random_state
 from symdyn.lab.peers.description import describe
 from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
 from symdyn.lab.peers.symdyn_peer import symdyn_program
-from symdyn.runtime.batches.states import UNIT, tables_of
+from symdyn.runtime.batches.states import LIBRARY, tables_of
 from symdyn.runtime.building.compiler import flags, require_compiler
 from symdyn.runtime.building.library import Frame
 from symdyn.runtime.module import Module
@@ -61,7 +61,7 @@ def chain() -> Iterator[Figure]:
 
     batch_out, out = np.empty(x.shape[::-1]).T, np.empty(rows.shape)
     at_once = _direct(module, x, batch_out)
-    evaluator: Any = module.unit("rhs").evaluator("rhs")
+    evaluator: Any = module.library("rhs").evaluator("rhs")
     evaluator.set_params(module.parameters())
     given = (evaluator.t, rows, evaluator.ud, evaluator.inputs, evaluator.p, evaluator.c, out)
     frame = Frame(STATES, *[a.ctypes.data for a in given], 0, 1, 0, 0, 0)
@@ -111,7 +111,7 @@ def stack_traffic(equations: Equations) -> dict[str, int]:
 
 def _direct(module: Module, x: np.ndarray, out: np.ndarray) -> Callable[[], Any]:
     """The compiled function behind rhs_batch without Python around it, as the others are called."""
-    unit: Any = module.unit(UNIT)
+    unit: Any = module.library(LIBRARY)
     kept = [np.zeros((1, 1)), x, np.zeros((1, 0)), module.parameters()[None, :], out, np.zeros(len(x), dtype=np.intc)]
     call, tables, steps = unit.function("rhs_batch"), tables_of(kept[:4]), (ctypes.c_long * 2)(1, len(x))
     n, result, codes = ctypes.c_long(len(x)), ctypes.c_void_p(out.ctypes.data), ctypes.c_void_p(kept[5].ctypes.data)

@@ -284,5 +284,5 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
           f"number); energy and C over {DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
     if to_json is not None:
         to_json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
-    return sum(found > bound for row in rows
-               for found, bound in zip((row.error / row.condition, row.energy, row.violation), BOUNDS, strict=True))
+    return sum(result > bound for row in rows
+               for result, bound in zip((row.error / row.condition, row.energy, row.violation), BOUNDS, strict=True))

@@ -96,16 +96,16 @@ def _ball() -> sd.System:
 
 def ball_heights(times: np.ndarray) -> np.ndarray:
     """Heights of the ball, (n_t,)."""
-    begin, speed, found = np.sqrt(2 * HEIGHT / G), np.sqrt(2 * HEIGHT * G), np.zeros(len(times))
+    begin, speed, result = np.sqrt(2 * HEIGHT / G), np.sqrt(2 * HEIGHT * G), np.zeros(len(times))
     first = times < begin
-    found[first] = HEIGHT - G * times[first] ** 2 / 2
+    result[first] = HEIGHT - G * times[first] ** 2 / 2
     while speed > 1e-15:
         speed *= RESTITUTION
         since = times - begin
         flies = (since >= 0) & (since < 2 * speed / G)
-        found[flies] = speed * since[flies] - G * since[flies] ** 2 / 2
+        result[flies] = speed * since[flies] - G * since[flies] ** 2 / 2
         begin += 2 * speed / G
-    return found
+    return result
 
 
 def _oscillator() -> sd.System:
@@ -121,13 +121,13 @@ def _oscillator() -> sd.System:
 def oscillator_places(times: np.ndarray) -> np.ndarray:
     """Places of the mass on the spring, (n_t,): half periods about the middles by which friction displaces it."""
     half, off = np.pi / np.sqrt(STIFFNESS / MASS), FRICTION / STIFFNESS
-    n, place, found = 0, AMPLITUDE, np.zeros(len(times))
+    n, place, result = 0, AMPLITUDE, np.zeros(len(times))
     while abs(place) > off:
         middle, now = np.sign(place) * off, (times >= n * half) & (times < (n + 1) * half)
-        found[now] = middle + (place - middle) * np.cos(np.pi / half * (times[now] - n * half))
+        result[now] = middle + (place - middle) * np.cos(np.pi / half * (times[now] - n * half))
         place, n = 2 * middle - place, n + 1
-    found[times >= n * half] = place
-    return found
+    result[times >= n * half] = place
+    return result
 
 
 def _billiard() -> sd.System:
@@ -150,14 +150,14 @@ def billiard_places(times: np.ndarray) -> np.ndarray:
 def motions() -> dict[str, Motion]:
     """The motions by name."""
     ball, oscillator, billiard = np.linspace(0, 3, 31), np.linspace(0, 6, 31), np.linspace(0, 1.5, 31)
-    found = [
+    result = [
         Motion("ball", _ball, ([HEIGHT], [0.0]), ball, ball_heights(ball)[:, None], HEIGHT,
                {MUJOCO: partial(_most_exact, partial(_mujoco, _MJ_BALL)), EXUDYN: partial(_most_exact, partial(_exudyn, True))}),
         Motion("oscillator", _oscillator, ([AMPLITUDE], [0.0]), oscillator, oscillator_places(oscillator)[:, None], AMPLITUDE,
                {MUJOCO: partial(_mujoco, _MJ_OSCILLATOR), EXUDYN: partial(_exudyn, False)}),
         Motion("billiard", _billiard, ([0, 0, RADIUS, 1, 0, 0, 0], [*SPEED, 0.0, *SPIN, 0.0]), billiard,
                billiard_places(billiard), 1.0, {MUJOCO: partial(_mujoco, _MJ_BILLIARD)})]
-    return {motion.name: motion for motion in found}
+    return {motion.name: motion for motion in result}
 
 
 # -- MuJoCo

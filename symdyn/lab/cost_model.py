@@ -48,22 +48,22 @@ MODELS = {
 
 def systems() -> dict[str, Callable[[], System]]:
     """The systems that are measured, by name; what stands before the bracket is the family."""
-    found: dict[str, Callable[[], System]] = {}
+    result: dict[str, Callable[[], System]] = {}
     for n in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20):
-        found[f"n_link_pendulum({n})"] = partial(get, "n_link_pendulum", n=n)
+        result[f"n_link_pendulum({n})"] = partial(get, "n_link_pendulum", n=n)
     for n in (2, 3, 4, 5, 6, 7, 8, 10, 12, 16):
-        found[f"spatial_chain({n})"] = partial(get, "spatial_chain", n=n)
+        result[f"spatial_chain({n})"] = partial(get, "spatial_chain", n=n)
     for convention in ("standard", "modified"):
         for general in (False, True):
             name = f"puma560({convention}{', general' if general else ''})"
-            found[name] = partial(get, "puma560", convention=convention, general=general)
+            result[name] = partial(get, "puma560", convention=convention, general=general)
     for body_rates in (False, True):
-        found[f"turbine_tree({'body rates' if body_rates else 'Euler angles'})"] = partial(turbine_tree, body_rates)
+        result[f"turbine_tree({'body rates' if body_rates else 'Euler angles'})"] = partial(turbine_tree, body_rates)
     for name in ("cart_pole", "two_link_arm", "three_link_arm", "prismatic_chain"):
-        found[name] = partial(get, name)
+        result[name] = partial(get, name)
     for seed, n in enumerate(range(3, 13), start=1):
-        found[f"random_tree({n}, seed {seed})"] = partial(random_tree, n, seed)
-    return found
+        result[f"random_tree({n}, seed {seed})"] = partial(random_tree, n, seed)
+    return result
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ def forming(samples: Sequence[Sample]) -> list[float]:
     """Instructions of forces and mass matrix, without factorizing and solving, over those of the recursion in the same frames,
     of systems with more than two speeds."""
     by = {(s.system, s.candidate.formulation, s.candidate.frames): s.terms for s in samples if s.terms["speeds"] > 2}
-    return [(found["instructions"] - found["solving"]) / by[system, "recursive", frames]["instructions"]
-            for (system, formulation, frames), found in by.items() if formulation == "embedding"]
+    return [(result["instructions"] - result["solving"]) / by[system, "recursive", frames]["instructions"]
+            for (system, formulation, frames), result in by.items() if formulation == "embedding"]
 
 
 def further_terms(derived: Derived) -> dict[str, float]:
@@ -173,9 +173,9 @@ def run(repeats: int = 40) -> int:
     samples: list[Sample] = []
     print(f"  {HEADING}")
     for name, make in systems().items():
-        found = measure(name, make(), repeats)
-        print_system(found)
-        samples += found
+        result = measure(name, make(), repeats)
+        print_system(result)
+        samples += result
     ratios = forming(samples)
     print(f"\nforces and mass matrix take {min(ratios):.2f} to {max(ratios):.2f} of the instructions of the recursion")
     print("\nlosses where not fitted, and constants fitted to all systems, ns:")

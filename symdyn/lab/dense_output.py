@@ -313,7 +313,7 @@ def measure(number: int, method: str, rtol: float, seed: int = 0) -> Result:
     with warnings.catch_warnings():
         warnings.simplefilter("error", SimulationWarning)
         try:
-            found = module.simulate(times, **problem.start, method=method, rtol=rtol)
+            result = module.simulate(times, **problem.start, method=method, rtol=rtol)
         except ArgumentError:
             return Result(*name, why="does not fit")
         except SimulationWarning as warning:
@@ -325,7 +325,7 @@ def measure(number: int, method: str, rtol: float, seed: int = 0) -> Result:
     def error(x: np.ndarray, right: np.ndarray) -> float:
         return float((np.abs(x - right) / (rtol + rtol * np.abs(right))).max())
 
-    return Result(*name, error(found.x, exact), error(ends.x, at_ends), found.n_steps, seconds)
+    return Result(*name, error(result.x, exact), error(ends.x, at_ends), result.n_steps, seconds)
 
 
 def results(numbers: Sequence[int], methods: Sequence[str], tolerances: Sequence[float], seed: int) -> Iterator[Result]:
@@ -336,11 +336,11 @@ def results(numbers: Sequence[int], methods: Sequence[str], tolerances: Sequence
                 yield measure(number, method, rtol, seed)
 
 
-def table(found: Sequence[Result]) -> str:
+def table(result: Sequence[Result]) -> str:
     """The largest errors of every method, and where they are."""
     lines = [f"{'method':9}{'runs':>6}{'between':>10}{'at ends':>10}{'above':>7}  worst"]
-    for method in dict.fromkeys(r.method for r in found):
-        rows = [r for r in found if r.method == method and not r.why]
+    for method in dict.fromkeys(r.method for r in result):
+        rows = [r for r in result if r.method == method and not r.why]
         if rows:
             worst = max(rows, key=lambda r: r.between)
             above = sum(not r.passed for r in rows)

@@ -122,12 +122,12 @@ def measure(name: str, equations: Equations, modules: Sequence[Any], point: Poin
             direction = _direction(equations, modules[0], by, point, rng)
             exact = _difference(equations, tape, values, by, point, direction)
             for module in modules if (of, by) == OF_C else modules[:1]:
-                found = _derivative(module, of, by, point, 1)[0]
-                size = max(float(np.linalg.norm(found) * np.linalg.norm(direction)), level, 1e-30)
-                error = float(np.linalg.norm(found @ direction - exact)) / (size * condition)
+                result = _derivative(module, of, by, point, 1)[0]
+                size = max(float(np.linalg.norm(result) * np.linalg.norm(direction)), level, 1e-30)
+                error = float(np.linalg.norm(result @ direction - exact)) / (size * condition)
                 errors[f"{of} by {by}"] = max(errors.get(f"{of} by {by}", 0.0), error)
                 rows = _derivative(module, of, by, point, 3)
-                same &= all(np.array_equal(row, found) for row in rows)
+                same &= all(np.array_equal(row, result) for row in rows)
     return Result(name, errors, condition, same, clock.perf_counter() - begun)
 
 
@@ -146,8 +146,8 @@ def _derivative(module: Any, of: str, by: str, point: Point, n: int) -> np.ndarr
     """The matrix at n rows of the same state."""
     rows = [np.repeat(a[None], n, axis=0) for a in (point.x, point.ud)]
     ud = rows[1] if of == "inverse_dynamics" else ()
-    found = module.jacobian(np.full(n, point.t), rows[0], point.params, point.inputs, [by], of, ud)
-    return np.asarray(getattr(found, by))
+    result = module.jacobian(np.full(n, point.t), rows[0], point.params, point.inputs, [by], of, ud)
+    return np.asarray(getattr(result, by))
 
 
 def _values(equations: Equations, point: Point) -> dict[str, float]:
@@ -161,9 +161,9 @@ def _values(equations: Equations, point: Point) -> dict[str, float]:
 
 def _names(equations: Equations, by: str) -> list[str]:
     s = equations.symbols
-    found = {"x": [a.name for a in (*s.coordinates, *s.speeds, *s.states)], "inputs": [a.name for a in s.inputs],
-             "params": [a.name for a in s.parameters], "t": ["t"], "ud": [f"{u.name}_dot" for u in s.speeds]}
-    return found[by]
+    result = {"x": [a.name for a in (*s.coordinates, *s.speeds, *s.states)], "inputs": [a.name for a in s.inputs],
+              "params": [a.name for a in s.parameters], "t": ["t"], "ud": [f"{u.name}_dot" for u in s.speeds]}
+    return result[by]
 
 
 def _direction(equations: Equations, module: Any, by: str, point: Point, rng: np.random.Generator) -> np.ndarray:
@@ -224,7 +224,7 @@ def random_result(number: int, seed: int) -> Result:
     m = draw(number, seed)
     name = f"{number} {' '.join(m.kinds)}"
     ud = np.random.default_rng(number).normal(size=len(m.module.metadata.u))
-    x = beside(m.equations, m.x, np.random.default_rng(number)) if m.equations.constraints else m.x
+    x = off_constraints(m.equations, m.x, np.random.default_rng(number)) if m.equations.constraints else m.x
     point = Point(m.t, x, m.inputs, m.module.parameters(m.params), ud)
     modules = [m.module if m.module.backend == "numpy" else m.equations.compile(backend="numpy")]
     if number % IN_C == 0 and find_compiler() is not None:
@@ -232,7 +232,7 @@ def random_result(number: int, seed: int) -> Result:
     return _measured(name, m.equations, modules, point, number)
 
 
-def beside(equations: Equations, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def off_constraints(equations: Equations, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """A state near x, Euler parameters of unit length, that is not on the constraints: on them rows that are redundant depend on
     each other as far as doubles go, and not with 60 digits."""
     moved = x + 0.05 * rng.normal(size=len(x))
@@ -249,7 +249,7 @@ def catalogue_result(name: str) -> Result:
     modules = [equations.compile(backend=b) for b in (("numpy", "c") if find_compiler() is not None else ("numpy",))]
     rng, s = np.random.default_rng(5), equations.symbols
     start = np.array([float(s.initial.get(a, 0)) for a in (*s.coordinates, *s.speeds, *s.states)])
-    start = beside(equations, start, rng)
+    start = off_constraints(equations, start, rng)
     params = np.array([0.6 if v is None else v for v in modules[0].metadata.defaults])
     point = Point(0.3, start, rng.normal(size=len(s.inputs)), params, rng.normal(size=len(s.speeds)))
     return _measured(name, equations, modules, point, 5)
@@ -305,15 +305,15 @@ def within(running: Iterable[Result], seconds: float) -> Iterator[Result]:
             return
 
 
-def summary(found: Sequence[Result]) -> str:
+def summary(result: Sequence[Result]) -> str:
     """Largest error of each derivative, and how many fail."""
-    kinds = dict.fromkeys(kind for r in found for kind in r.errors)
-    lines = [f"{kind:26} {max(r.errors[kind] for r in found if kind in r.errors):.1e} at most, in "
-             f"{sum(kind in r.errors for r in found)}" for kind in sorted(kinds)]
-    failed = sum(not r.passed for r in found)
-    differ = sum(not r.same_bits for r in found)
-    return "\n".join([*lines, f"{len(found)} mechanisms, {failed} fail, {differ} with rows that differ, "
-                      f"{sum(r.seconds for r in found) / max(1, len(found)):.2f} s each"])
+    kinds = dict.fromkeys(kind for r in result for kind in r.errors)
+    lines = [f"{kind:26} {max(r.errors[kind] for r in result if kind in r.errors):.1e} at most, in "
+             f"{sum(kind in r.errors for r in result)}" for kind in sorted(kinds)]
+    failed = sum(not r.passed for r in result)
+    differ = sum(not r.same_bits for r in result)
+    return "\n".join([*lines, f"{len(result)} mechanisms, {failed} fail, {differ} with rows that differ, "
+                      f"{sum(r.seconds for r in result) / max(1, len(result)):.2f} s each"])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -58,8 +58,8 @@ def simulated(flow: Flow, x: np.ndarray, span: float) -> np.ndarray:
     def field(t: float, y: np.ndarray) -> np.ndarray:
         if next(evaluations) > MOST:
             raise RuntimeError(f"{flow.module.name}: simulation over {span} s takes more than {MOST} evaluations")
-        found: np.ndarray = flow.module.evaluate("rhs", t, y.reshape(shape), flow.p, flow.inputs)
-        return found.ravel()
+        result: np.ndarray = flow.module.evaluate("rhs", t, y.reshape(shape), flow.p, flow.inputs)
+        return result.ravel()
 
     solution = scipy.integrate.solve_ivp(field, (flow.t, flow.t + span), x.ravel(), method="DOP853", rtol=RELATIVE, atol=ABSOLUTE)
     if not solution.success:
@@ -71,8 +71,8 @@ def simulated(flow: Flow, x: np.ndarray, span: float) -> np.ndarray:
 def transition(flow: Flow) -> tuple[np.ndarray, float]:
     """Phi (m, m): changes of eta, zeta and z after the span for those before; and how uncertain its entries are."""
     end = simulated(flow, flow.x[None], SPAN)[0]
-    found, change = romberg(lambda h: simulated(flow, flow.states(h), SPAN), flow.coordinates.size, STEP, HALVINGS)
-    return flow.values(end, found), float(change.max(initial=0.0))
+    result, change = romberg(lambda h: simulated(flow, flow.states(h), SPAN), flow.coordinates.size, STEP, HALVINGS)
+    return flow.values(end, result), float(change.max(initial=0.0))
 
 
 def observe(flow: Flow) -> Observed:

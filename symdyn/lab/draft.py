@@ -220,8 +220,8 @@ class Draft:
         """R and d of a joint, where its coordinates have values."""
         algebra = Numbers({**self.values, sd.t: self.t})
         s = [algebra.expression(q) for q in joint.coordinates]
-        found = joint.motion(algebra, s, [0.0] * joint.n_speeds)
-        return np.array(found.R, dtype=float), np.array(found.d, dtype=float)
+        result = joint.motion(algebra, s, [0.0] * joint.n_speeds)
+        return np.array(result.R, dtype=float), np.array(result.d, dtype=float)
 
     def _draw(self, joint: Joint, own: Sequence[sp.Symbol]) -> None:
         units = dict(zip(joint.coordinates, joint.coordinate_units, strict=True))
@@ -244,14 +244,14 @@ class Draft:
         """What may close a loop so that the loop, and the mechanism, keep a freedom; inside: not with the ground."""
         kinds = CLOSES_PLANAR if self.planar else CLOSES_SPATIAL
         links = self.moving if inside else self.links
-        found = []
+        result = []
         for a, b in combinations(links, 2):
             for kind, taken in kinds.items():
                 if kind != "Gear" and taken < self.path(a, b) and self.freedoms - taken >= 2:
-                    found += [(kind, a, b)] * taken  # those that take more are rarer
+                    result += [(kind, a, b)] * taken  # those that take more are rarer
         if len(self.single()) > 1 and self.freedoms > 2:
-            found.append(("Gear", self.links[0], self.links[1]))
-        return found
+            result.append(("Gear", self.links[0], self.links[1]))
+        return result
 
     def close(self, kind: str, a: Link, b: Link) -> None:
         """Close a loop where the bodies are."""
@@ -332,10 +332,10 @@ def renamed(number: int) -> Speed:
 
 
 def _ancestors(link: Link) -> list[Link]:
-    found = [link]
-    while found[-1].parent is not None:
-        found.append(found[-1].parent)
-    return found
+    result = [link]
+    while result[-1].parent is not None:
+        result.append(result[-1].parent)
+    return result
 
 
 def _floats(point: Iterable[Expression]) -> np.ndarray:

@@ -123,8 +123,8 @@ def _of_sine(w: float, p: float, d: float) -> np.ndarray:
     """Zeros of sin(w t + p) - (1 - d): pi/2 -+ 2 arcsin(sqrt(d/2)), which loses no digits where d is small."""
     half = 2 * np.arcsin(np.sqrt(d / 2))
     turns = 2 * np.pi * np.arange(-2, int(w * SPAN / 6) + 3) + np.pi / 2
-    found = np.sort(np.concatenate([(turns - half - p) / w, (turns + half - p) / w]))
-    return np.array(found[(found > 0) & (found < SPAN)])
+    result = np.sort(np.concatenate([(turns - half - p) / w, (turns + half - p) / w]))
+    return np.array(result[(result > 0) & (result < SPAN)])
 
 
 def _sampled(value: Any, w: float) -> np.ndarray:
@@ -135,18 +135,18 @@ def _sampled(value: Any, w: float) -> np.ndarray:
     inner = np.flatnonzero((np.abs(v[1:-1]) <= np.abs(v[:-2])) & (np.abs(v[1:-1]) <= np.abs(v[2:]))) + 1
     for k in inner:
         sign = np.sign(v[k])
-        found = minimize_scalar(lambda s, sign=sign: sign * float(value(s)), bounds=(t[k - 1], t[k + 1]), method="bounded",
-                                options={"xatol": 1e-12})
-        points.append(float(found.x))
+        result = minimize_scalar(lambda s, sign=sign: sign * float(value(s)), bounds=(t[k - 1], t[k + 1]), method="bounded",
+                                 options={"xatol": 1e-12})
+        points.append(float(result.x))
     points.sort()
     v = value(np.array(points))
     return np.array([brentq(lambda s: float(value(s)), points[k], points[k + 1], xtol=1e-14)
                      for k in np.flatnonzero(v[1:] * v[:-1] < 0)])
 
 
-def count(found: np.ndarray, zeros: np.ndarray, near: float) -> Count:
+def count(result: np.ndarray, zeros: np.ndarray, near: float) -> Count:
     """Zeros without an event and events without a zero, each paired once, in order."""
-    left, missed = list(found), 0
+    left, missed = list(result), 0
     for zero in zeros:
         k = int(np.argmin(np.abs(np.array(left) - zero))) if left else -1
         if k >= 0 and abs(left[k] - zero) <= near:

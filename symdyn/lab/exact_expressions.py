@@ -55,10 +55,10 @@ def failure(seed: int) -> str:
     symbols = sorted(symbols_of(given) | symbols_of(short), key=str)
     with mpmath.workdps(DIGITS):
         point = [mpmath.mpf(draw.randint(20, 190)) / 97 for _ in symbols]
-        wanted, found = (sp.lambdify(symbols, e, "mpmath")(*point) for e in (given, short))
-        bound = (DECIMAL if given.has(sp.Float) else EXACT) * (1 + abs(wanted) + abs(found))
-        if not abs(wanted - found) <= bound:
-            return f"{given} has the value {mpmath.nstr(wanted, 15)}, its shortest form {short} {mpmath.nstr(found, 15)}"
+        wanted, result = (sp.lambdify(symbols, e, "mpmath")(*point) for e in (given, short))
+        bound = (DECIMAL if given.has(sp.Float) else EXACT) * (1 + abs(wanted) + abs(result))
+        if not abs(wanted - result) <= bound:
+            return f"{given} has the value {mpmath.nstr(wanted, 15)}, its shortest form {short} {mpmath.nstr(result, 15)}"
     if given.has(sp.Float):
         return ""
     read = sp.sympify(str(short), locals={s.name: s for s in symbols})

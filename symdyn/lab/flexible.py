@@ -67,10 +67,10 @@ def spun_up() -> Iterator[Figure]:
 def closed_loop() -> Iterator[Figure]:
     """Slider-crank with a flexible rod, which stretches by 8e-6 m in the reference, and not here."""
     for name, beam in (("kinematics of the source", crank.linear_rod()), ("with foreshortening", crank.rod())):
-        found = crank.at_the_end(beam)
+        result = crank.at_the_end(beam)
         for quantity, reference in crank.REFERENCE.items():
             wanted = "< 1e-3" if name.startswith("kin") else ""
-            yield f"slider-crank, {name}: {quantity} off published", abs(found[quantity] / reference - 1), "", wanted
+            yield f"slider-crank, {name}: {quantity} off published", abs(result[quantity] / reference - 1), "", wanted
 
 
 def tumbling() -> Iterator[Figure]:
@@ -88,8 +88,8 @@ def tumbling() -> Iterator[Figure]:
         yield f"thrown, {name}: energy error with damping", damped.energy_error(), "", "<= 1e-8"
     for way in cases.FORMS[:2]:
         module = forms[f"{way}, parameters"].compile()
-        found = cases.momenta(module, cases.throw(module, params={"g": 0.0, "delta": 2.0}))
-        off = np.abs(found - found[0]).reshape(-1, 2, 3).max(axis=(0, 2)) / np.linalg.norm(found[0].reshape(2, 3), axis=1)
+        result = cases.momenta(module, cases.throw(module, params={"g": 0.0, "delta": 2.0}))
+        off = np.abs(result - result[0]).reshape(-1, 2, 3).max(axis=(0, 2)) / np.linalg.norm(result[0].reshape(2, 3), axis=1)
         yield f"thrown without gravity, {way}: change of momentum", float(off[0]), "", "< 1e-9"
         yield f"thrown without gravity, {way}: change of angular momentum", float(off[1]), "", "< 1e-9"
     for name, form in forms.items():
@@ -123,15 +123,15 @@ def floating() -> Iterator[Figure]:
         yield f"floating turbine, accelerations, {name}", value, "", "< 1e-10" if name != "constraints" else ""
     for form in cases.FORMS:
         begun = clock.perf_counter()
-        found = cases.equations(sd.systems.floating_wind_turbine(flexible=True), form)
-        tape = function_tape(found, "rhs")
+        result = cases.equations(sd.systems.floating_wind_turbine(flexible=True), form)
+        tape = function_tape(result, "rhs")
         yield f"floating turbine, {form}: describe and derive", clock.perf_counter() - begun, "s", ""
         yield f"floating turbine, {form}: operations", tape.operations, "", ""
-        yield f"floating turbine, {form}: compile with integrator", compile_time(found), "s", ""
-        yield f"floating turbine, {form}: one evaluation", evaluation_time(found) * 1e6, "us", ""
+        yield f"floating turbine, {form}: compile with integrator", compile_time(result), "s", ""
+        yield f"floating turbine, {form}: one evaluation", evaluation_time(result) * 1e6, "us", ""
         if form == "absolute":
             continue
-        module = found.compile()
+        module = result.compile()
         runs = [module.simulate(t=(0, 600), q={"theta": 0.05, "z": 0.2, "x": 0.5}, rtol=1e-8) for _ in range(3)]
         yield f"floating turbine, {form}: 600 s, rtol 1e-8", min(run.integrator_seconds or run.seconds for run in runs), "s", ""
         started = module.simulate(t=(0, 60), inputs={"v_w": 8.0, "tau_a": 2e6}, work=True, rtol=1e-9)

@@ -133,11 +133,11 @@ def tower_frequencies(system: System) -> np.ndarray:
     """Hz, first fore-aft (x) and side-to-side (y) about equilibrium; yaw, where there is one, is held."""
     module, beam = system.embedding().compile(backend="numpy"), beam_of(system)
     keep = {"yaw": 0.0} if "yaw" in module.metadata.q else {}
-    found = {}
+    result = {}
     for mode in list(module.linearize(module.equilibrium(fixed=keep)).modes())[:2]:
         sway = np.abs(beam.Psi_tip[:2] @ mode.shape[:beam.n])
-        found[int(np.argmax(sway))] = mode.frequency
-    return np.array([found[0], found[1]])
+        result[int(np.argmax(sway))] = mode.frequency
+    return np.array([result[0], result[1]])
 
 
 def beam_of(system: System) -> ModalBody:
@@ -281,28 +281,28 @@ def apart(one: Any, other: Any) -> float:
 # -- agreement of formulations
 
 
-def random_states(found: Equations, n: int, seed: int = 0) -> States:
+def random_states(result: Equations, n: int, seed: int = 0) -> States:
     """Places within 3 m, angles up to 60 degrees, any azimuth, tips within some hundredths of the length, speeds up to 1."""
     rng = np.random.default_rng(seed)
-    s = found.symbols
+    s = result.symbols
     rigid = {"x": 3.0, "y": 3.0, "z": 3.0, "azimuth": np.pi}
     reach = [0.3 * s.reach[q] if q in s.reach else rigid.get(q.name, np.pi / 3) for q in s.coordinates]
     return States(rng.uniform(-1, 1, (n, len(reach))) * reach, rng.uniform(-1, 1, (n, len(s.speeds))))
 
 
-def in_all_coordinates(system: System, found: Equations, states: States) -> dict[str, np.ndarray]:
+def in_all_coordinates(system: System, result: Equations, states: States) -> dict[str, np.ndarray]:
     """Coordinates and speeds of every form at states of the embedded one in Euler angles, by name."""
     from scipy.spatial.transform import Rotation
 
     model, n = system.check(), len(states.q)
-    numbers = values(found, states, "frames", "J")
+    numbers = values(result, states, "frames", "J")
     R, p = numbers["frames"][:, :, 3:].reshape(n, -1, 3, 3), numbers["frames"][:, :, :3]
     com = np.array([[float(e.xreplace(dict(model.defaults))) for e in body.com] for body in model.bodies])
     twists = np.einsum("nij,nj->ni", numbers["J"], states.u).reshape(n, -1, 6)
     v = twists[:, :, :3] - np.cross(twists[:, :, 3:], np.einsum("nkij,kj->nki", R, com))
     v_body, omega = (np.einsum("nkji,nkj->nki", R, w) for w in (v, twists[:, :, 3:]))
     e = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat().reshape(n, -1, 4)[:, :, [3, 0, 1, 2]]
-    s = found.symbols
+    s = result.symbols
     given = dict(zip([a.name for a in (*s.coordinates, *s.speeds)], [*states.q.T, *states.u.T], strict=True))
     for k, body in enumerate(model.bodies):
         for i, axis in enumerate("xyz"):
@@ -313,10 +313,10 @@ def in_all_coordinates(system: System, found: Equations, states: States) -> dict
     return given | {f"{name}_{axis}": w[:, 0, i] for name, w in (("v", v_body), ("omega", omega)) for i, axis in enumerate("xyz")}
 
 
-def accelerations(found: Equations, states: States) -> dict[str, np.ndarray]:
+def accelerations(result: Equations, states: States) -> dict[str, np.ndarray]:
     """By the names of the speeds."""
-    numbers = values(getattr(found, "otherwise", None) or found, states, "accelerations")["accelerations"]
-    return dict(zip([u.name for u in found.symbols.speeds], numbers.T, strict=True))
+    numbers = values(getattr(result, "otherwise", None) or result, states, "accelerations")["accelerations"]
+    return dict(zip([u.name for u in result.symbols.speeds], numbers.T, strict=True))
 
 
 def agreement(system: System, quasi: System, n: int) -> dict[str, float]:
@@ -333,9 +333,9 @@ def agreement(system: System, quasi: System, n: int) -> dict[str, float]:
         s = form.symbols
         q, u = (np.column_stack([given[a.name] for a in group]) for group in (s.coordinates, s.speeds))
         here = States(q, u)
-        found = accelerations(form, here)
-        common = [u for u in wanted if u in found]
-        a, b = (np.stack([row[u] for u in common]) for row in (found, wanted))
+        result = accelerations(form, here)
+        common = [u for u in wanted if u in result]
+        a, b = (np.stack([row[u] for u in common]) for row in (result, wanted))
         errors[name] = float((np.abs(a - b).max(axis=0) / np.abs(b).max(axis=0)).max())
         if name == "absolute":
             errors["constraints"] = float(np.abs(values(form, here, "C")["C"]).max())
@@ -375,8 +375,8 @@ def platform_frequencies(module: Module, params: dict[str, float]) -> np.ndarray
 
 def rigid_numbers() -> dict[str, float]:
     """The rigid turbine's parameters by the integrals of the flexible bodies, in place of the sums over elements."""
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for letter, beam in (("T", tower_beam().modal), ("B", blade_beam().modal)):
         z = beam.h0[2] / beam.m
-        found |= {f"m_{letter}": beam.m, f"z_{letter}": float(z), f"I_{letter}": float(beam.I0[0, 0] - beam.m * z**2)}
-    return found
+        result |= {f"m_{letter}": beam.m, f"z_{letter}": float(z), f"I_{letter}": float(beam.I0[0, 0] - beam.m * z**2)}
+    return result

@@ -75,6 +75,6 @@ def at_the_end(beam: ModalBody, rtol: float = 1e-10) -> dict[str, float]:
     q, u = module.consistent(q={"x3": CRANK + ROD}, u={"q1_dot": START[0], "q2_dot": START[1], "b_dot": turning},
                              keep=["q1", "q2", "q1_dot", "q2_dot"])
     solution = module.simulate(t=(0, END), q=q, u=u, rtol=rtol, atol=1e-12)
-    found = {name: float(solution[name][-1]) for name in module.metadata.q}
-    angle = found.pop("b") + SPEED * END - float(_SLOPES @ [found["q1"], found["q2"]])
-    return {"phi2": float(np.angle(np.exp(1j * angle))), **found}
+    result = {name: float(solution[name][-1]) for name in module.metadata.q}
+    angle = result.pop("b") + SPEED * END - float(_SLOPES @ [result["q1"], result["q2"]])
+    return {"phi2": float(np.angle(np.exp(1j * angle))), **result}

@@ -99,8 +99,8 @@ class Flow:
             x = self.states(h)
             return np.hstack([x, self._rates(x), self._outputs(x)])
 
-        found, first = self._differences(along, self.coordinates.size)
-        x_h, rates_h, y_h = np.split(found, [self.n_x, 2 * self.n_x], axis=1)
+        result, first = self._differences(along, self.coordinates.size)
+        x_h, rates_h, y_h = np.split(result, [self.n_x, 2 * self.n_x], axis=1)
         A = self.reduced(x_h, rates_h)
 
         def driven(h: np.ndarray) -> np.ndarray:
@@ -160,14 +160,14 @@ class Flow:
             N: np.ndarray = self.module.evaluate("N", times, x, self.p)
             return N.reshape(len(h), -1)
 
-        found, _ = self._differences(along, 1)
-        return found[0].reshape(self.n_q, self.n_u) / slow
+        result, _ = self._differences(along, 1)
+        return result[0].reshape(self.n_q, self.n_u) / slow
 
     # -- the module
 
     def _evaluate(self, name: str, x: np.ndarray) -> np.ndarray:
-        found: np.ndarray = self.module.evaluate(name, self.t, x, self.p)
-        return found
+        result: np.ndarray = self.module.evaluate(name, self.t, x, self.p)
+        return result
 
     def _rates(self, x: np.ndarray, inputs: np.ndarray | None = None) -> np.ndarray:
         return self._rows("rhs", x, self.inputs if inputs is None else inputs)
@@ -179,8 +179,8 @@ class Flow:
         return self._rows("outputs", x, inputs)
 
     def _rows(self, name: str, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        found: np.ndarray = self.module.evaluate(name, self.t, x, self.p, inputs)
-        return found.reshape(-1, found.shape[-1])
+        result: np.ndarray = self.module.evaluate(name, self.t, x, self.p, inputs)
+        return result.reshape(-1, result.shape[-1])
 
 
 def romberg(function: Callable[[np.ndarray], np.ndarray], n: int, step: float, halvings: int = HALVINGS

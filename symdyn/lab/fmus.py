@@ -31,16 +31,16 @@ POINTS = 21
 
 def validated(path: Path) -> list[str]:
     """What FMPy finds in an FMU; nothing where it is good."""
-    found: list[str] = importlib.import_module("fmpy.validation").validate_fmu(str(path))
-    return found
+    result: list[str] = importlib.import_module("fmpy.validation").validate_fmu(str(path))
+    return result
 
 
 def by_importer(path: Path, names: Sequence[str], times: np.ndarray) -> np.ndarray:
     """The states of an FMU at times, simulated by FMPy with its own integrator."""
     fmpy: Any = importlib.import_module("fmpy")
-    found = fmpy.simulate_fmu(str(path), stop_time=times[-1], output_interval=times[1], relative_tolerance=TOLERANCE,
-                              record_events=False, output=list(names))
-    return np.array([found[name] for name in names]).T
+    result = fmpy.simulate_fmu(str(path), stop_time=times[-1], output_interval=times[1], relative_tolerance=TOLERANCE,
+                               record_events=False, output=list(names))
+    return np.array([result[name] for name in names]).T
 
 
 def by_scipy(path: Path, names: Sequence[str], times: np.ndarray) -> np.ndarray:
@@ -71,13 +71,13 @@ def by_scipy(path: Path, names: Sequence[str], times: np.ndarray) -> np.ndarray:
             return rates.copy()
 
         fmu.getContinuousStates(at_x, len(x))
-        found = [x.copy()]
+        result = [x.copy()]
         for span in pairwise(times):
-            solved = solve_ivp(field, span, found[-1], method="DOP853", rtol=TOLERANCE, atol=TOLERANCE / 10)
-            found.append(solved.y[:, -1])
+            solved = solve_ivp(field, span, result[-1], method="DOP853", rtol=TOLERANCE, atol=TOLERANCE / 10)
+            result.append(solved.y[:, -1])
         fmu.terminate()
         fmu.freeInstance()
-        return np.array(found)
+        return np.array(result)
 
 
 def compared(module: Module, path: Path, duration: float, integrator: str = "importer") -> float:

@@ -66,7 +66,7 @@ def run(only: Sequence[str] | None = None) -> int:
 
 def _figures(name: str) -> Iterator[Figure]:
     module = sd.systems.get(name).compile(backend="c")
-    unit: Any = module.unit(RightSide(threads=True))
+    unit: Any = module.library(RightSide(threads=True))
     begun = clock.perf_counter()
     compiling.cubin(unit.source, name, ARCHITECTURE)
     yield f"{name}: compiling the kernel, or finding it in the cache", clock.perf_counter() - begun, "s", ""
@@ -84,9 +84,9 @@ def _resources(text: str, name: str, kernel: str = "motions") -> dict[str, float
     """Registers, and bytes of the stack, that the compiler reports of a kernel."""
     log = compiling.report(text, name, ARCHITECTURE)
     kernel = log.partition(f"_{kernel}' for")[2]
-    found = {"registers": r"Used (\d+) registers", "bytes of stack": r"(\d+) bytes stack frame",
-             "bytes of spilled registers": r"(\d+) bytes spill stores"}
-    return {what: float(match[1]) if (match := re.search(pattern, kernel)) else np.nan for what, pattern in found.items()}
+    result = {"registers": r"Used (\d+) registers", "bytes of stack": r"(\d+) bytes stack frame",
+              "bytes of spilled registers": r"(\d+) bytes spill stores"}
+    return {what: float(match[1]) if (match := re.search(pattern, kernel)) else np.nan for what, pattern in result.items()}
 
 
 def _compared(module: Module, unit: Any, name: str) -> Iterator[Figure]:
@@ -115,7 +115,7 @@ def _compared(module: Module, unit: Any, name: str) -> Iterator[Figure]:
 def _rates(name: str, precision: str) -> Iterator[Figure]:
     """What a kernel of right-hand sides takes, what bounds it, and how fast it is with states that lie on the device."""
     module = sd.systems.get(name).compile(backend="c")
-    unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
+    unit: Any = module.library(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
     for what, value in _resources(unit.source, name, "states").items():
         yield f"{name} rhs, {precision}: {what} of a thread, for {ARCHITECTURE}", value, "", ""
     dtype, n_x = np.dtype(PRECISIONS[precision]), module.metadata.sizes.x

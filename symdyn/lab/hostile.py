@@ -260,8 +260,8 @@ class Worker:
         with contextlib.suppress(EOFError, ConnectionError):
             self.end.send(number)
             if self.end.poll(LIMIT):
-                found: Result = self.end.recv()
-                return found
+                result: Result = self.end.recv()
+                return result
         case = draw(number, self.seed, self.names)
         hangs = self.process.is_alive()
         self.process.kill()

@@ -39,9 +39,9 @@ def _value(name: str, make: Callable[[], Any], *tags: str) -> Value:
 
 def _cyclic() -> list[Any]:
     """A list that is an entry of itself."""
-    found: list[Any] = []
-    found.append(found)
-    return found
+    result: list[Any] = []
+    result.append(result)
+    return result
 
 
 VALUES: tuple[Value, ...] = (

@@ -68,20 +68,20 @@ def measure(kind: str, number: int, method: str, rtol: float, seed: int = 0) -> 
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         try:
-            found = _module().simulate(times, [1.0], params={"k": w**2}, rtol=rtol, method=method.partition(" ")[0],
-                                       inputs=sd.Smooth(force) if method == AS_SMOOTH else force)
+            result = _module().simulate(times, [1.0], params={"k": w**2}, rtol=rtol, method=method.partition(" ")[0],
+                                        inputs=sd.Smooth(force) if method == AS_SMOOTH else force)
         except ArgumentError as raised:
             return Result(kind, number, method, np.nan, f"raises: {raised}")
-    error = np.abs(found.q[:, 0] - exact[:len(found.t)]) / (rtol + rtol * np.abs(exact[:len(found.t)]))
+    error = np.abs(result.q[:, 0] - exact[:len(result.t)]) / (rtol + rtol * np.abs(exact[:len(result.t)]))
     return Result(kind, number, method, float(error.max()),
                   "; ".join(str(w.message) for w in seen if issubclass(w.category, SimulationWarning)))
 
 
-def table(found: Sequence[Result]) -> str:
+def table(result: Sequence[Result]) -> str:
     """Of every method and kind: how many errors are above the bound, are reported, are not; the largest error."""
     lines = [f"{'method':17}{'kind':6}{'runs':>5}{'above':>7}{'reported':>10}{'silent':>8}{'largest':>10}"]
-    for method, kind in dict.fromkeys((r.method, r.kind) for r in found):
-        rows = [r for r in found if (r.method, r.kind) == (method, kind)]
+    for method, kind in dict.fromkeys((r.method, r.kind) for r in result):
+        rows = [r for r in result if (r.method, r.kind) == (method, kind)]
         largest = max((r.error for r in rows if np.isfinite(r.error)), default=np.nan)
         lines.append(f"{method:17}{kind:6}{len(rows):>5}{sum(r.error > BOUND for r in rows):>7}"
                      f"{sum(bool(r.reported) for r in rows):>10}{sum(r.silent for r in rows):>8}{largest:>10.3g}")
@@ -96,10 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=COUNT, help=f"of jumps, and of kinks (default {COUNT})")
     parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
     options = parser.parse_args(arguments)
-    found = [measure(kind, number, method, options.rtol, options.seed)
-             for method in options.methods for kind in ("jump", "kink") for number in range(options.count)]
-    print(table(found))
-    return int(any(r.silent for r in found if r.method != AS_SMOOTH))
+    result = [measure(kind, number, method, options.rtol, options.seed)
+              for method in options.methods for kind in ("jump", "kink") for number in range(options.count)]
+    print(table(result))
+    return int(any(r.silent for r in result if r.method != AS_SMOOTH))
 
 
 if __name__ == "__main__":

@@ -54,8 +54,8 @@ def evaluated(equations: Equations, language: str) -> Callable[..., np.ndarray]:
             subprocess.run([*command[:-1], text], cwd=folder, check=True, capture_output=True, timeout=SECONDS)
             return np.loadtxt(folder / "found.txt", ndmin=2)
         with (folder / "states.txt").open() as states:
-            found = subprocess.run([*command, "rhs"], cwd=folder, stdin=states, check=True, capture_output=True, text=True,
-                                   timeout=SECONDS).stdout
-        return np.array([[float(word) for word in line.split()] for line in found.splitlines()])
+            result = subprocess.run([*command, "rhs"], cwd=folder, stdin=states, check=True, capture_output=True, text=True,
+                                    timeout=SECONDS).stdout
+        return np.array([[float(word) for word in line.split()] for line in result.splitlines()])
 
     return run

@@ -155,28 +155,28 @@ def verdict_of_motion(mechanism: Mechanism) -> tuple[str, str]:
     """The verdict of `stability`, which also judges motions whose coordinates accelerate; or no verdict, and the reason."""
     hold = {"hold": list(mechanism.hold)} if mechanism.hold else {}
     try:
-        found = mechanism.module.stability(mechanism.x, mechanism.params, t=mechanism.t, inputs=mechanism.inputs, **hold)
+        result = mechanism.module.stability(mechanism.x, mechanism.params, t=mechanism.t, inputs=mechanism.inputs, **hold)
     except (ArgumentError, NoEquilibrium) as error:
         return NO_VERDICT, str(error)
-    return str(found.verdict), ""
+    return str(result.verdict), ""
 
 
-def relative(found: np.ndarray, expected: np.ndarray) -> float:
+def relative(result: np.ndarray, expected: np.ndarray) -> float:
     """Norm of the difference relative to that of what is expected, at least LEAST."""
     size = max(float(np.linalg.norm(expected)), LEAST)
-    return float(np.linalg.norm(found - expected)) / size if expected.size else 0.0
+    return float(np.linalg.norm(result - expected)) / size if expected.size else 0.0
 
 
-def _worst(linear: Any, errors: Sequence[float], found: Matrices, expected: Matrices) -> str:
+def _worst(linear: Any, errors: Sequence[float], result: Matrices, expected: Matrices) -> str:
     """Names and numbers of the entry that differs most, of the matrix with the largest error."""
     k = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
-    difference = np.abs(found[k] - expected[k])
+    difference = np.abs(result[k] - expected[k])
     if not difference.size:
         return ""
     row, column = np.unravel_index(int(np.argmax(difference)), difference.shape)
     rows = linear.states if k < 2 else linear.outputs
     columns = linear.states if k in (0, 2) else linear.module.metadata.inputs
-    return (f"{NAMES[k]}[{rows[row]}, {columns[column]}] is {found[k][row, column]:.9g}, differences give "
+    return (f"{NAMES[k]}[{rows[row]}, {columns[column]}] is {result[k][row, column]:.9g}, differences give "
             f"{expected[k][row, column]:.9g}")
 
 
@@ -190,17 +190,17 @@ def results(numbers: Sequence[int], seed: int, verdicts: bool, jobs: int) -> Ite
         yield from pool.map(one, numbers)
 
 
-def table(found: Sequence[Result]) -> str:
+def table(result: Sequence[Result]) -> str:
     """How many there are of every kind, their largest errors, and the share that is above the bound."""
-    kinds = list(dict.fromkeys(kind for r in sorted(found, key=lambda r: r.number) for kind in r.kinds))
+    kinds = list(dict.fromkeys(kind for r in sorted(result, key=lambda r: r.number) for kind in r.kinds))
     lines = [f"{'kind':24}{'count':>7}" + "".join(f"{name:>10}" for name in NAMES) + f"{'above':>8}"]
     for kind in ["all", *kinds]:
-        rows = [r for r in found if kind == "all" or kind in r.kinds]
+        rows = [r for r in result if kind == "all" or kind in r.kinds]
         errors = np.array([r.errors for r in rows])
         worst = np.where(np.isnan(errors), np.inf, errors).max(axis=0)
         share = sum(not r.passed for r in rows) / len(rows)
         lines.append(f"{kind:24}{len(rows):>7}" + "".join(f"{e:>10.1e}" for e in worst) + f"{share:>8.1%}")
-    judged = [r for r in found if r.verdict]
+    judged = [r for r in result if r.verdict]
     if judged:
         lines.append(f"verdicts: {sum(r.verdict == r.observed for r in judged)} of {len(judged)} as in simulation")
         counts = Counter((r.verdict, r.observed) for r in judged)

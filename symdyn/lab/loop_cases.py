@@ -99,9 +99,9 @@ def _pendulum() -> Reference:
     rate = lambda x, y: np.sqrt(np.maximum(-2 * 9.81 * y, 0))  # of energy
 
     def errors(sol: Any) -> Errors:
-        found = sol.q[1:]
+        result = sol.q[1:]
         speed = np.hypot(*sol.u[1:].T)
-        return largest(found - rows[:, 1:]), largest(speed - rate(*rows[:, 1:].T))
+        return largest(result - rows[:, 1:]), largest(speed - rate(*rows[:, 1:].T))
 
     return Reference("closed form", rows[:, 0], errors, row["source"])
 
@@ -112,9 +112,9 @@ def _windows(n: int) -> Reference:
 
     def errors(sol: Any) -> Errors:
         theta, rate = sol.q[1:, 0], sol.u[1:, 0]
-        found = np.transpose([np.sin(theta), np.cos(theta), rate * np.cos(theta), -rate * np.sin(theta)])
+        result = np.transpose([np.sin(theta), np.cos(theta), rate * np.cos(theta), -rate * np.sin(theta)])
         folded = largest(sol.q[:, :n + 1] - sol.q[:, :1])
-        return max(largest(found[:, :2] - rows[:, 1:3]), folded), largest(found[:, 2:] - rows[:, 3:])
+        return max(largest(result[:, :2] - rows[:, 1:3]), folded), largest(result[:, 2:] - rows[:, 3:])
 
     return Reference("closed form", rows[:, 0], errors, row["source"])
 
@@ -239,12 +239,12 @@ def chosen(names: Sequence[str] | None) -> list[Case]:
 
     Raises SymdynError for a name that there is not.
     """
-    found: list[Case] = []
+    result: list[Case] = []
     for name in names or CASES:
         own = [case for case in CASES.values() if name in (case.label, case.name)]
         if not own:
             near = difflib.get_close_matches(name, CASES, 3)
             raise SymdynError(f"there is no loop to measure with the name {name!r}; "
                               + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(CASES)}"))
-        found += [case for case in own if case not in found]
-    return found
+        result += [case for case in own if case not in result]
+    return result

@@ -28,7 +28,7 @@ def ranks(module: Any, t: float, x: np.ndarray, p: np.ndarray, least: float = 0.
     Raises `error` if a singular value lies between those of dependent rows and `least` times the largest.
     """
     C_r = module.evaluate("C_r", t, x, p)
-    found = []
+    result = []
     for rows in (C_r[holonomic(module)], C_r):
         sizes = np.linalg.norm(rows, axis=1, keepdims=True)
         rows = rows / np.where(sizes > 0, sizes, 1.0)
@@ -37,8 +37,8 @@ def ranks(module: Any, t: float, x: np.ndarray, p: np.ndarray, least: float = 0.
         rank = int((values > DEPENDENT * first).sum())
         if rank and values[rank - 1] < least * first:
             raise error(f"constraints are nearly dependent: {values[rank - 1] / first:.2g}")
-        found.append((rank, Vt[rank:].T))
-    return found[0][0], found[1][0], found[1][1]
+        result.append((rank, Vt[rank:].T))
+    return result[0][0], result[1][0], result[1][1]
 
 
 def holonomic(module: Any) -> np.ndarray:

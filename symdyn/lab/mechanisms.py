@@ -345,11 +345,11 @@ class _Composer:
 
     def _loop(self) -> None:
         draft = self.draft
-        found = draft.closures(self.motion == "steady")
-        while not found:
+        result = draft.closures(self.motion == "steady")
+        while not result:
             self._any_joint()
-            found = draft.closures(self.motion == "steady")
-        draft.close(*self.rng.choice(found))
+            result = draft.closures(self.motion == "steady")
+        draft.close(*self.rng.choice(result))
 
     def _holonomic(self) -> None:
         self.draft.system.add_constraint(self._function())
@@ -589,8 +589,8 @@ class _Composer:
         n_q, names = metadata.sizes.q, [p.name for p in self.trims]
 
         def rates(values: np.ndarray) -> np.ndarray:
-            found: np.ndarray = module.rhs(t, x, dict(zip(names, values, strict=True)), inputs)[n_q:]
-            return found
+            result: np.ndarray = module.rhs(t, x, dict(zip(names, values, strict=True)), inputs)[n_q:]
+            return result
 
         still = rates(np.zeros(len(names)))
         slopes = np.column_stack([rates(e) - still for e in np.eye(len(names))])

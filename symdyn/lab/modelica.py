@@ -120,13 +120,13 @@ def compared(module: Module, text: str, states: int = STATES) -> tuple[np.ndarra
     t = rng.uniform(0, 2, states)
     x = start + 0.3 * rng.normal(size=(states, len(start)))
     inputs = rng.normal(size=(states, len(metadata.inputs)))
-    found = computed(module, text, x, t, inputs)
+    result = computed(module, text, x, t, inputs)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         wanted = module.evaluate("rhs", t, x, np.array(module.default_parameters), inputs)
-    there = np.isfinite(found).all(axis=1), np.isfinite(wanted).all(axis=1)
+    there = np.isfinite(result).all(axis=1), np.isfinite(wanted).all(axis=1)
     both = there[0] & there[1]
-    errors = np.abs(found - wanted)[both].max(axis=1) / np.maximum(np.abs(wanted[both]).max(axis=1), 1e-300)
+    errors = np.abs(result - wanted)[both].max(axis=1) / np.maximum(np.abs(wanted[both]).max(axis=1), 1e-300)
     return errors, int((there[0] != there[1]).sum())
 
 

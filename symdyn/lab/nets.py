@@ -94,11 +94,11 @@ def by_hand(rows: int, columns: int, names: Sequence[str], q: np.ndarray, u: np.
     """
     from flint import arb, arb_mat, ctx
 
-    place = {name: k for k, name in enumerate(names)}
+    index = {name: k for k, name in enumerate(names)}
     with ctx.workprec(BITS):
         def known(values: np.ndarray, knot: tuple[int, int], still: Sequence[float]) -> list[Any]:
             keys = [f"{letter}{knot[0]}_{knot[1]}" for letter in "xyz"]
-            return [arb(float(values[place[key]])) if key in place else arb(e) for key, e in zip(keys, still, strict=True)]
+            return [arb(float(values[index[key]])) if key in index else arb(e) for key, e in zip(keys, still, strict=True)]
 
         C, right = list[dict[int, Any]](), []
         for i, j in np.ndindex(rows, columns):
@@ -108,8 +108,8 @@ def by_hand(rows: int, columns: int, names: Sequence[str], q: np.ndarray, u: np.
                 ends = [(knot, [WIDTH * knot[1], DEPTH * (knot[1] % 2), -1.0 * knot[0]]) for knot in ((i, j), other)]
                 D = [b - a for a, b in zip(*(known(q, knot, at) for knot, at in ends), strict=True)]
                 rates = [b - a for a, b in zip(*(known(u, knot, [0.0] * 3) for knot, _ in ends), strict=True)]
-                row = {place[key]: sign * along for (a, b), sign in zip(((i, j), other), (-1, 1), strict=True)
-                       for letter, along in zip("xyz", D, strict=True) if (key := f"{letter}{a}_{b}") in place}
+                row = {index[key]: sign * along for (a, b), sign in zip(((i, j), other), (-1, 1), strict=True)
+                       for letter, along in zip("xyz", D, strict=True) if (key := f"{letter}{a}_{b}") in index}
                 if row:
                     C.append(row)
                     right.append(sum((e * e for e in rates), arb(0)))
@@ -126,10 +126,10 @@ def by_hand(rows: int, columns: int, names: Sequence[str], q: np.ndarray, u: np.
                     S[i * len(C) + j] += C[i][k] * C[j][k]
         pull = arb_mat(len(C), len(C), S).solve(arb_mat(len(C), 1, right))  # by mass
         pulled = [sum((C[i][k] * pull[i, 0] for i in together), arb(0)) for k, together in enumerate(at)]
-        found = [g - p for g, p in zip(weight, pulled, strict=True)]
-        if any(e.rad() > 1e-30 for e in found):
+        result = [g - p for g, p in zip(weight, pulled, strict=True)]
+        if any(e.rad() > 1e-30 for e in result):
             raise ArgumentError(f"{BITS} bits do not suffice for a net of {rows} x {columns}; take a smaller one")
-        return np.array([float(e.mid()) for e in found])
+        return np.array([float(e.mid()) for e in result])
 
 
 def moving(module: Module) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +146,7 @@ def measure(side: int) -> Row:
     module = equations.compile(backend="c")
     q, u = moving(module)
     x, rhs = np.concatenate([q, u]), module.bind(None).rhs
-    found = rhs(0.0, x)[len(q):]
+    result = rhs(0.0, x)[len(q):]
     write = clock.process_time() - begun
     compiled = with_children() - before - write
     exact = by_hand(side, side, module.metadata.q, q, u)
@@ -160,15 +160,15 @@ def measure(side: int) -> Row:
     if not sol.success:
         raise ArithmeticError(sol.message)
     return Row(side, len(u), len(equations.constraints), equations.tape("rhs").operations, derive, write, compiled,
-               min(times) * 1e6, float(np.abs(found - exact).max() / np.abs(exact).max()), sol.n_steps, sol.energy_error(),
+               min(times) * 1e6, float(np.abs(result - exact).max() / np.abs(exact).max()), sol.n_steps, sol.energy_error(),
                float(np.abs(sol.constraint_violation).max()))
 
 
 def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     """Measure and print; returns how many bounds are missed. Raises ArgumentError for sides of less than 3 particles."""
     if not sizes or min(sizes) < 3:
-        found = " ".join(map(str, sizes)) or "none"
-        raise ArgumentError(f"nets take numbers of particles along a side, 3 or more; found {found}")
+        result = " ".join(map(str, sizes)) or "none"
+        raise ArgumentError(f"nets take numbers of particles along a side, 3 or more; found {result}")
     print(HEADING)
     rows = []
     for side in sizes:
@@ -178,4 +178,5 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
           f"{DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
     if to_json is not None:
         to_json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
-    return sum(found > bound for row in rows for found, bound in zip((row.error, row.energy, row.violation), BOUNDS, strict=True))
+    return sum(result > bound for row in rows
+               for result, bound in zip((row.error, row.energy, row.violation), BOUNDS, strict=True))

@@ -46,11 +46,11 @@ def cart_pole() -> Iterator[Figure]:
     peer.start, peer.end = (start, start), (end, end)
     peer.guess = lambda share: (1 - share) * np.array(start) + share * np.array(end)
     yield from _compared("cart-pole", lambda: solve(intervals=K, tolerance=None), peer, SAME)
-    found = solve(tolerance=1e-7)
-    yield "cart-pole: cost of a refined mesh less the published one", abs(found.cost - CONVERGED), "", "<= 5e-06"
-    yield "cart-pole: iterations on all meshes", found.iterations, "", ""
-    yield "cart-pole: simulated back, largest difference", max(found.difference.values()), "", "<= 1e-4"
-    yield "cart-pole: time with refinement", found.seconds, "s", "< 10"
+    result = solve(tolerance=1e-7)
+    yield "cart-pole: cost of a refined mesh less the published one", abs(result.cost - CONVERGED), "", "<= 5e-06"
+    yield "cart-pole: iterations on all meshes", result.iterations, "", ""
+    yield "cart-pole: simulated back, largest difference", max(result.difference.values()), "", "<= 1e-4"
+    yield "cart-pole: time with refinement", result.seconds, "s", "< 10"
 
 
 def minimum_time() -> Iterator[Figure]:
@@ -84,11 +84,12 @@ def linkage() -> Iterator[Figure]:
     peer.start, peer.end = ([0.5, 0], [0.5, 0]), ([2.5, 0], [2.5, 0])
     peer.guess = lambda share: np.array([0.5 + 2 * share, 0.0])
     yield from _compared("linkage", lambda: solve(intervals=K, tolerance=None), peer, NEAR)
-    found = solve(transcription="radau", degree=4, tolerance=1e-8)
+    result = solve(transcription="radau", degree=4, tolerance=1e-8)
     fine = _Collocation(2, 1, 320, peer.field, (1.0, 1.0))
     fine.start, fine.end, fine.guess = peer.start, peer.end, peer.guess
-    yield "linkage: refined cost less CasADi's of 320 intervals, relative", abs(found.cost / fine.solve().cost - 1), "", "<= 1e-7"
-    yield "linkage: simulated back, largest difference", max(found.difference.values()), "", "<= 1e-5"
+    less = abs(result.cost / fine.solve().cost - 1)
+    yield "linkage: refined cost less CasADi's of 320 intervals, relative", less, "", "<= 1e-7"
+    yield "linkage: simulated back, largest difference", max(result.difference.values()), "", "<= 1e-5"
 
 
 def biped() -> Iterator[Figure]:
@@ -110,11 +111,11 @@ def biped() -> Iterator[Figure]:
     peer.of_boundary = ([0.0 if not isinstance(c, sp.Le) else -np.inf for c in conditions],
                         [0.0 if not isinstance(c, sp.Ge) else np.inf for c in conditions])
     yield from _compared("biped", lambda: gait.step(module, intervals=K, tolerance=None), peer, SAME)
-    found = gait.step(module, intervals=10, transcription="radau", tolerance=1e-6)
-    yield "biped: cost of a refined mesh", found.cost, "N2m2s", ""
-    yield "biped: iterations on all meshes", found.iterations, "", ""
-    yield "biped: simulated back, largest difference", max(found.difference.values()), "", "<= 1e-2"
-    yield "biped: time with refinement", found.seconds, "s", "< 10"
+    result = gait.step(module, intervals=10, transcription="radau", tolerance=1e-6)
+    yield "biped: cost of a refined mesh", result.cost, "N2m2s", ""
+    yield "biped: iterations on all meshes", result.iterations, "", ""
+    yield "biped: simulated back, largest difference", max(result.difference.values()), "", "<= 1e-2"
+    yield "biped: time with refinement", result.seconds, "s", "< 10"
     published = gait.step(module, intervals=10, transcription="radau", degree=4, tolerance=None, inputs={"u1": 0},
                           **gait.PUBLISHED)
     less = abs(published.cost / gait.PUBLISHED_COST - 1)
@@ -170,11 +171,11 @@ class _Collocation:
                                      [sum(self.duration) / 2] * free]), least, most)
         zeros = np.zeros(2 * self.K * self.n_x)
         made = clock.process_time()
-        found = solver(x0=z0, lbx=least, ubx=most, lbg=np.concatenate([zeros, self.of_boundary[0]]),
-                       ubg=np.concatenate([zeros, self.of_boundary[1]]))
+        result = solver(x0=z0, lbx=least, ubx=most, lbg=np.concatenate([zeros, self.of_boundary[0]]),
+                        ubg=np.concatenate([zeros, self.of_boundary[1]]))
         stats = solver.stats()
         assert stats["success"], stats["return_status"]
-        return _Found(float(found["f"]), int(stats["iter_count"]), made - begun, clock.process_time() - made)
+        return _Found(float(result["f"]), int(stats["iter_count"]), made - begun, clock.process_time() - made)
 
     def _bounds(self, side: int, N: int, free: bool) -> np.ndarray:
         worst = np.maximum if side == 0 else np.minimum
@@ -188,16 +189,16 @@ def _compared(name: str, ours: Callable[[], sd.Optimum], peer: _Collocation, bou
     """Costs, iterations and least processor times of both, in turns."""
     package_folder("casadi")
     ours()  # compiles
-    found, theirs, seconds, made, solved = ours(), peer.solve(), np.inf, np.inf, np.inf
+    result, theirs, seconds, made, solved = ours(), peer.solve(), np.inf, np.inf, np.inf
     for _ in range(REPEATS):
         begun = clock.process_time()
-        found = ours()
+        result = ours()
         seconds = min(seconds, clock.process_time() - begun)
         theirs = peer.solve()
         made, solved = min(made, theirs.made), min(solved, theirs.solved)
-    yield f"{name}: cost", found.cost, "", ""
-    yield f"{name}: less that of CasADi, relative", abs(found.cost / theirs.cost - 1), "", f"<= {bound:g}"
-    yield f"{name}: iterations", found.iterations, "", ""
+    yield f"{name}: cost", result.cost, "", ""
+    yield f"{name}: less that of CasADi, relative", abs(result.cost / theirs.cost - 1), "", f"<= {bound:g}"
+    yield f"{name}: iterations", result.iterations, "", ""
     yield f"{name}: iterations of CasADi", theirs.iterations, "", ""
     yield f"{name}: time", seconds, "s", "< 10"
     yield f"{name}: time of CasADi to make the problem", made, "s", ""

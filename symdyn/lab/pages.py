@@ -136,11 +136,11 @@ def _processes() -> dict[str, float]:
         named = next((word.removeprefix("--type=") for word in words if word.startswith("--type=")), "")
         kind = named or ("browser" if words and "chrom" in words[0] else "")
         children.setdefault(int(fields[1]), []).append((int(folder.name), spent, kind))
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     waiting = [os.getpid()]
     while waiting:
         for number, spent, kind in children.get(waiting.pop(), ()):
             waiting.append(number)
             if kind:
-                found[kind] = found.get(kind, 0.0) + spent
-    return found
+                result[kind] = result.get(kind, 0.0) + spent
+    return result

@@ -75,8 +75,8 @@ def predicted(path: str, jobs: int) -> None:
     begun = sum(os.times()[:4])
     tried = plan(module, **asked.arguments(module)).tried()
     measured = measure(tried, file.parent, jobs, tuple(asked.values.get("formats", ())), begun)
-    found = predict(tried, measured, tried.samples.count, 1, jobs)
-    print(json.dumps(asdict(Taken(found.core + measured.start + found.merge, found.wall, found.result, found.memory))))
+    result = predict(tried, measured, tried.samples.count, 1, jobs)
+    print(json.dumps(asdict(Taken(result.core + measured.start + result.merge, result.wall, result.result, result.memory))))
 
 
 def taken(file: Path, jobs: int, out: Path) -> Taken:
@@ -156,9 +156,9 @@ def run(rows: int = 10_000_000, part: float = 1.0, jobs: int = 1) -> int:
                   f"{before.result / 1e6:6.1f} {after.result / 1e6:6.1f} | {before.memory / 1e6:4.0f} {after.memory / 1e6:4.0f}",
                   flush=True)
     for n in (rows // 10, rows):
-        found = apart("merged", n)
+        result = apart("merged", n)
         parts = ", ".join(f"{label} {seconds:.1f} s and {memory / 1e6:.0f} MB more"
-                          for label, (memory, seconds) in found["parts"].items())
-        print(f"{n} rows of five numbers, {found['result'] / 1e6:.0f} MB: {parts}; the process {found['total'] / 1e6:.0f} MB",
+                          for label, (memory, seconds) in result["parts"].items())
+        print(f"{n} rows of five numbers, {result['result'] / 1e6:.0f} MB: {parts}; the process {result['total'] / 1e6:.0f} MB",
               flush=True)
     return 0

@@ -182,11 +182,11 @@ def main() -> int:
         equations = make()
         if arguments.simplify:
             equations = replace(equations, simplify_seconds=arguments.simplify)
-        found = list(compare(equations, arguments.states, arguments.simplify > 0, most=arguments.most))
-        wrong = [c for c in found if not c.passed]
+        result = list(compare(equations, arguments.states, arguments.simplify > 0, most=arguments.most))
+        wrong = [c for c in result if not c.passed]
         failed += len(wrong)
-        largest = max(c.error for c in found)
-        print(f"{title}: {len(found)} quantities, largest difference {largest:.1e}, {len(wrong)} do not agree")
+        largest = max(c.error for c in result)
+        print(f"{title}: {len(result)} quantities, largest difference {largest:.1e}, {len(wrong)} do not agree")
         for c in wrong:
             print(f"    {c.name}: {', '.join(c.strange) or f'{c.error:.1e}'}")
     return int(failed > 0)

@@ -68,12 +68,12 @@ class Row:
     @property
     def faults(self) -> list[str]:
         """What must not be."""
-        found = ["another form is shorter"] if self.longer else []
+        result = ["another form is shorter"] if self.longer else []
         if self.bound is not None and (self.operations is None or self.operations > self.bound):
-            found.append(f"above {self.bound}")
+            result.append(f"above {self.bound}")
         if self.named_bound is not None and (self.named is None or self.named >= self.named_bound):
-            found.append(f"with names not below {self.named_bound}")
-        return found
+            result.append(f"with names not below {self.named_bound}")
+        return result
 
     def __str__(self) -> str:
         best = self.next_best or (None, "")

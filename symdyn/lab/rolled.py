@@ -119,9 +119,9 @@ def measure(name: str, n: int) -> list[Rolled]:
     largest = max(abs(e) for e in exact)
     rows = []
     for (rolled, derive, text), loop, time in zip(made, loops, times, strict=True):
-        found = loop.evaluator.one(0.0, x).ravel()
+        result = loop.evaluator.one(0.0, x).ravel()
         function, code = text.program.functions[0], next(iter(text.files.values()))
-        error = float(max(abs(e - f) for e, f in zip(exact, found.tolist(), strict=True)) / largest)
+        error = float(max(abs(e - f) for e, f in zip(exact, result.tolist(), strict=True)) / largest)
         statements = function.written if function.loops else function.count
         rows.append(Rolled(name, n, rolled, tape.operations, statements, derive, len(code), compile_seconds(code), time, error))
     return rows

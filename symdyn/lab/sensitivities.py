@@ -47,7 +47,7 @@ def cvodes() -> Iterator[Figure]:
         return module.simulate(np.array([0.0, END]), START[:5], START[5:], rtol=rtol, method=method, sensitivities=NAMES)
 
     exact = run(1e-14, "taylor").sensitivity.matrix[-1]
-    error = lambda found: float(np.abs(found - exact).max() / np.abs(exact).max())
+    error = lambda result: float(np.abs(result - exact).max() / np.abs(exact).max())
     ours = run(RTOL)
     quickest = min(_seconds(lambda: run(RTOL)) for _ in range(100))
     own = error(ours.sensitivity.matrix[-1])
@@ -55,9 +55,9 @@ def cvodes() -> Iterator[Figure]:
     yield "time of the motion with sensitivities", 1e3 * quickest, "ms", ""
     yield "steps", ours.n_steps, "", ""
     for rtol in TRIED:
-        seconds, found = _by_cvodes(equations, module.default_parameters, rtol)
-        if error(found) <= own or rtol == TRIED[-1]:
-            yield f"CVODES at {rtol:g}: error, relative", error(found), "", ""
+        seconds, result = _by_cvodes(equations, module.default_parameters, rtol)
+        if error(result) <= own or rtol == TRIED[-1]:
+            yield f"CVODES at {rtol:g}: error, relative", error(result), "", ""
             yield "CVODES: time", 1e3 * seconds, "ms", ""
             yield "CVODES' time by symdyn's", seconds / quickest, "", ">= 10"
             return
@@ -65,8 +65,8 @@ def cvodes() -> Iterator[Figure]:
 
 def _in_turns(*calls: Any, read: Callable[[], float] = clock.process_time) -> list[float]:
     """The least time of each of some calls, s; read: the clock, of this process unless calls wait for others."""
-    found = [[_seconds(call, read) for call in calls] for _ in range(60)]
-    return [min(column) for column in zip(*found, strict=True)]
+    result = [[_seconds(call, read) for call in calls] for _ in range(60)]
+    return [min(column) for column in zip(*result, strict=True)]
 
 
 def _seconds(call: Any, read: Callable[[], float] = clock.perf_counter) -> float:
@@ -99,8 +99,8 @@ def _within_folder(equations: Equations, values: np.ndarray, rtol: float) -> tup
     integrator = ca.integrator("motion", "cvodes", {"x": x, "p": by, "ode": casadi_field(ca, equations, leaves)}, 0, END, options)
     forward = integrator.forward(len(NAMES))
     call = lambda: forward(x0=START, p=values[places], fwd_x0=np.zeros((len(START), len(NAMES))), fwd_p=np.eye(len(NAMES)))
-    found = np.array(call()["fwd_xf"])
-    return min(_seconds(call) for _ in range(10)), found
+    result = np.array(call()["fwd_xf"])
+    return min(_seconds(call) for _ in range(10)), result
 
 
 def gradient() -> Iterator[Figure]:
@@ -113,14 +113,14 @@ def gradient() -> Iterator[Figure]:
         q = [sp.Symbol(name) for name in metadata.q]
         loss = sd.Loss(integral=q[0] ** 2 + sp.Symbol(metadata.u[1]) ** 2, end=(q[2] - 1) ** 2)
         motion: dict[str, Any] = {"q": np.linspace(0.1, 0.6, len(q)), "u": np.zeros(len(q)), "rtol": 1e-8}
-        found = module.gradient(loss, by, (0, END), **motion)
+        result = module.gradient(loss, by, (0, END), **motion)
         once, back = _in_turns(partial(module.simulate, np.array([0.0, END]), **motion),
                                partial(module.gradient, loss, by, (0, END), **motion))
         yield f"{name}: numbers that the gradient is by", len(by), "", ""
-        yield f"{name}: steps", found.n_steps, "", ""
+        yield f"{name}: steps", result.n_steps, "", ""
         yield f"{name}: time of a motion", 1e3 * once, "ms", ""
         yield f"{name}: time of its gradient, in motions", back / once, "", "<= 6"
-        yield f"{name}: most memory kept", found.memory / 2**10, "KiB", ""
+        yield f"{name}: most memory kept", result.memory / 2**10, "KiB", ""
 
 
 def diffrax() -> Iterator[Figure]:
@@ -137,10 +137,10 @@ def diffrax() -> Iterator[Figure]:
     q1, q3, u2 = sp.symbols("q1 q3 q2_dot")
     loss = sd.Loss(integral=q1**2 + u2**2, end=(q3 - 1) ** 2)
     call = partial(module.gradient, loss, by, (0, end), start[:6], start[6:], rtol=1e-8)
-    found = call()
+    result = call()
     yield "numbers that the gradient is by", len(by), "", ""
-    yield "steps", found.n_steps, "", ""
-    yield "most memory kept", found.memory / 2**10, "KiB", ""
+    yield "steps", result.n_steps, "", ""
+    yield "most memory kept", result.memory / 2**10, "KiB", ""
     forward = partial(module.simulate, np.array([0.0, end]), start[:6], start[6:], rtol=1e-8, sensitivities=by)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # some parameters have no effect
@@ -155,8 +155,9 @@ def diffrax() -> Iterator[Figure]:
         yield f"{adjoint}: compilation", theirs.compiled, "s", ""
         yield f"{adjoint}: steps", theirs.steps, "", ""
         yield f"{adjoint}: memory for what lies between", theirs.memory / 2**10, "KiB", ""
-        yield "difference of the losses, relative", abs(value / found.value - 1), "", "< 1e-7"
-        yield "difference of the gradients, relative", np.abs(gradient - found.array).max() / np.abs(gradient).max(), "", "< 1e-6"
+        yield "difference of the losses, relative", abs(value / result.value - 1), "", "< 1e-7"
+        apart = np.abs(gradient - result.array).max() / np.abs(gradient).max()
+        yield "difference of the gradients, relative", apart, "", "< 1e-6"
         once, their_time = _in_turns(call, theirs, read=clock.perf_counter)
         yield f"{adjoint}: time", 1e3 * their_time, "ms", ""
         yield f"{adjoint}: time by symdyn's", their_time / once, "", ">= 20"
@@ -213,10 +214,10 @@ class _ByDiffrax:
 def memory() -> Iterator[Figure]:
     """What the gradient of a pendulum's swing keeps, over the number of steps."""
     module = sd.systems.pendulum().embedding().compile(backend="c")
-    found = [module.gradient(sd.Loss(end=sp.Symbol("q1")), ["l"], (0, end), [0.5], max_step=0.01) for end in (100, 400, 6400)]
-    for one in found:
+    result = [module.gradient(sd.Loss(end=sp.Symbol("q1")), ["l"], (0, end), [0.5], max_step=0.01) for end in (100, 400, 6400)]
+    for one in result:
         yield f"memory that a gradient of {one.n_steps} steps keeps", one.memory / 2**10, "KiB", ""
-    yield "that of the last by that of the one before, of 16 times fewer", found[2].memory / found[1].memory, "", "< 5"
+    yield "that of the last by that of the one before, of 16 times fewer", result[2].memory / result[1].memory, "", "< 5"
 
 
 def fit() -> Iterator[Figure]:
@@ -231,8 +232,8 @@ def fit() -> Iterator[Figure]:
     t, rng = np.linspace(0, 10, 1002), np.random.default_rng(0)
     measured = module.simulate(t, params={m: 1.3, d: 0.15}).q[:, 0] + 0.01 * rng.normal(size=1002)
     experiment = sd.Experiment(t, {q: measured}, q=[0.9])
-    found = sd.fit(module, experiment, [d, m], initial=[q])
-    off = [(found.values[name] - truth) / found.deviations[name] for name, truth in (("d", 0.15), ("m", 1.3), ("q(0)", 1.0))]
+    result = sd.fit(module, experiment, [d, m], initial=[q])
+    off = [(result.values[name] - truth) / result.deviations[name] for name, truth in (("d", 0.15), ("m", 1.3), ("q(0)", 1.0))]
     yield "fit of 1,002 values: largest error, in standard deviations", float(np.abs(off).max()), "", "< 3"
     for what, more in (("damping and mass", {}), ("damping, mass and start", {"initial": [q]})):
         quickest, = _in_turns(lambda more=more: sd.fit(module, experiment, [d, m], **more))

@@ -111,7 +111,7 @@ def measure(n: int) -> list[Row]:
     begun = clock.process_time()
     module = elastic_cable(n).embedding().compile(backend="c")
     derive = clock.process_time() - begun
-    places = module.places_of_jacobian()
+    places = module.jacobian_indices()
     assert places is not None
     exact = module.simulate([0, DURATION], method="Radau", rtol=1e-9).q[-1]
     rows = []
@@ -137,7 +137,7 @@ def at_rest(module: Module) -> tuple[np.ndarray, csc_matrix]:
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
-    places, n = module.places_of_jacobian(), module.metadata.sizes.q
+    places, n = module.jacobian_indices(), module.metadata.sizes.q
     assert places is not None
     own = (places.rows >= n) & (places.columns < n)
     q = np.array([module.metadata.initial.get(name, 0.0) for name in module.metadata.q])
@@ -185,26 +185,26 @@ def irvine(H: float, stiffness: float = EA, count: int = 5) -> np.ndarray:
     slope = WEIGHT / H
     stretched = 1 + slope**2 / 8
     square = slope**2 * stiffness / (H * stretched)
-    found = [2 * math.pi * k for k in range(1, count + 1)]
+    result = [2 * math.pi * k for k in range(1, count + 1)]
 
     def symmetric(w: float) -> float:
         return math.sin(w / 2) - math.cos(w / 2) * (w / 2 - 4 / square * (w / 2)**3)
 
     grid = np.linspace(0.1, 2 * math.pi * count, 400 * count)
     values = [symmetric(w) for w in grid]
-    found += [brentq(symmetric, a, b, xtol=1e-14) for a, b, f, h in zip(grid, grid[1:], values, values[1:]) if f * h < 0]
-    return np.sort(found)[:count] * math.sqrt(H)
+    result += [brentq(symmetric, a, b, xtol=1e-14) for a, b, f, h in zip(grid, grid[1:], values, values[1:]) if f * h < 0]
+    return np.sort(result)[:count] * math.sqrt(H)
 
 
 def compare(n: int) -> Rest:
     """A taut cable at rest compared with the elastic catenary, and with Irvine's frequencies: those of n links are off by the
     square of 1/n, which half as many links show and which is taken off."""
     H, sag = elastic_catenary(TAUT_EA, TAUT)
-    found, exact = [], irvine(H, TAUT_EA)
+    result, exact = [], irvine(H, TAUT_EA)
     for links in (n // 2, n):
         q, slope = at_rest(elastic_cable(links, TAUT_EA, TAUT).embedding().compile(backend="c"))
-        found.append(frequencies(slope))
-    limit = found[1] + (found[1] - found[0]) / ((n / (n // 2))**2 - 1)
+        result.append(frequencies(slope))
+    limit = result[1] + (result[1] - result[0]) / ((n / (n // 2))**2 - 1)
     own = -float(q[n - 1:].min())
     return Rest(n, own, abs(own / sag - 1), tuple(limit.tolist()), tuple(np.abs(limit / exact - 1).tolist()))
 

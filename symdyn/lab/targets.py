@@ -30,13 +30,13 @@ def compared(name: str, way: str, dtype: str, through: str = "xla") -> tuple[np.
     given = (rng.uniform(0, 2, STATES), start + 0.3 * rng.normal(size=(STATES, len(start))), np.array(module.default_parameters),
              rng.normal(size=(STATES, len(module.metadata.inputs))))
     t, x, p, inputs = (a.astype(kind).astype(float) for a in given)
-    found = _evaluated(equations, way, dtype, through)(t, x, p, inputs)
+    result = _evaluated(equations, way, dtype, through)(t, x, p, inputs)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         wanted = module.evaluate("rhs", t, x, p, inputs)
-    there = np.isfinite(found).all(axis=1), np.isfinite(wanted).all(axis=1)
+    there = np.isfinite(result).all(axis=1), np.isfinite(wanted).all(axis=1)
     both = there[0] & there[1]
-    errors = np.abs(found - wanted)[both].max(axis=1) / np.maximum(np.abs(wanted[both]).max(axis=1), 1e-300)
+    errors = np.abs(result - wanted)[both].max(axis=1) / np.maximum(np.abs(wanted[both]).max(axis=1), 1e-300)
     return errors, int((there[0] != there[1]).sum())
 
 

@@ -59,9 +59,9 @@ def values(equations: Equations, states: States, *names: str) -> dict[str, np.nd
 
 def body_accelerations(equations: Equations, states: States) -> np.ndarray:
     """[a_G; alpha] of every body, n-frame, (n, n_b, 6); where statements for them fail, by the numeric algorithm."""
-    found = values(equations, states, "J", "Jd_qd")
+    result = values(equations, states, "J", "Jd_qd")
     ud = values(getattr(equations, "otherwise", None) or equations, states, "accelerations")["accelerations"]
-    return (np.einsum("nij,nj->ni", found["J"], ud) + found["Jd_qd"]).reshape(len(ud), -1, 6)
+    return (np.einsum("nij,nj->ni", result["J"], ud) + result["Jd_qd"]).reshape(len(ud), -1, 6)
 
 
 class Poses:
@@ -72,11 +72,11 @@ class Poses:
 
         model = system.check()
         n = len(states.q)
-        found = values(equations, states, "frames", "J")
-        frames = found["frames"]
+        result = values(equations, states, "frames", "J")
+        frames = result["frames"]
         R, self.p = frames[:, :, 3:].reshape(n, -1, 3, 3), frames[:, :, :3]
         com = np.array([[float(e.xreplace(dict(model.defaults))) for e in body.com] for body in model.bodies])
-        twists = np.einsum("nij,nj->ni", found["J"], states.u).reshape(n, -1, 6)
+        twists = np.einsum("nij,nj->ni", result["J"], states.u).reshape(n, -1, 6)
         omega = twists[:, :, 3:]
         self.v = twists[:, :, :3] - np.cross(omega, np.einsum("nkij,kj->nki", R, com))
         self.v_body, self.omega_body = (np.einsum("nkji,nkj->nki", R, w) for w in (self.v, omega))
@@ -102,11 +102,11 @@ class Poses:
                                *[u[:, 6 + k] for k in driven]]))
 
 
-def difference(found: np.ndarray, wanted: np.ndarray) -> float:
+def difference(result: np.ndarray, wanted: np.ndarray) -> float:
     """Largest difference over the states, relative to the largest acceleration at each, linear and angular by themselves."""
     worst = 0.0
     for part in (slice(0, 3), slice(3, 6)):
-        a, b = found[:, :, part], wanted[:, :, part]
+        a, b = result[:, :, part], wanted[:, :, part]
         worst = max(worst, float((np.abs(a - b).max(axis=(1, 2)) / np.abs(b).max(axis=(1, 2))).max()))
     return worst
 
@@ -223,10 +223,10 @@ def statics() -> Iterator[Figure]:
     """Equilibria from random starts, and natural periods compared with those of free decay."""
     module = turbine(rotor="fixed").embedding().compile()
     reach = np.radians(20)
-    found = module.equilibria(100, dict.fromkeys("xyz", 3.0) | dict.fromkeys(("psi", "theta", "phi"), float(reach)))
-    yield "equilibria that 100 starts lead to", len(found), "", ""
-    yield "starts that lead nowhere", len(found.failures), "", "<= 0"
-    yield "most iterations of a start", int(found.iterations.max()), "", "<= 25"
+    result = module.equilibria(100, dict.fromkeys("xyz", 3.0) | dict.fromkeys(("psi", "theta", "phi"), float(reach)))
+    yield "equilibria that 100 starts lead to", len(result), "", ""
+    yield "starts that lead nowhere", len(result.failures), "", "<= 0"
+    yield "most iterations of a start", int(result.iterations.max()), "", "<= 25"
     rest = module.equilibrium()
     yield "draft in equilibrium", 4.0 - rest["z"], "m", ""
     for mode in module.linearize(rest).modes():
@@ -251,8 +251,8 @@ def flexible() -> Iterator[Figure]:
     same = beam_numbers()
     wanted = platform_frequencies(rigid, same)
     for factor, bound in ((1e2, ""), (1e4, ""), (1e6, "< 1e-5")):
-        found = platform_frequencies(module, {"s_T": factor, "s_B": factor})
-        off = float(np.abs(found / wanted - 1).max())
+        result = platform_frequencies(module, {"s_T": factor, "s_B": factor})
+        off = float(np.abs(result / wanted - 1).max())
         yield f"flexible, {factor:g} times as stiff: platform frequencies off rigid ones", off, "", bound
     tower = sd.systems.land_wind_turbine(rotor="fixed", flexible="tower").embedding().compile()
     for mode in tower.linearize(tower.equilibrium()).modes():
@@ -262,11 +262,11 @@ def flexible() -> Iterator[Figure]:
 
 def beam_numbers() -> dict[str, float]:
     """Parameters of the rigid turbine with mass and inertia of the flexible one's beams."""
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for letter, beam in (("T", tower_beam().modal), ("B", blade_beam().modal)):
         z = beam.h0[2] / beam.m
-        found |= {f"m_{letter}": beam.m, f"z_{letter}": z, f"I_{letter}": beam.I0[0, 0] - beam.m * z**2}
-    return found
+        result |= {f"m_{letter}": beam.m, f"z_{letter}": z, f"I_{letter}": beam.I0[0, 0] - beam.m * z**2}
+    return result
 
 
 def platform_frequencies(module: Any, params: dict[str, float]) -> np.ndarray:

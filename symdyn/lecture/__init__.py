@@ -18,8 +18,8 @@ def cases() -> tuple[Case, ...]:
     """All cases, in the order of the lecture. Nothing is derived before a case is compared."""
     modules = [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)
                if m.name.startswith("chapter_")]
-    found = [case for module in modules for case in module.CASES]
-    return tuple(sorted(found, key=lambda c: (c.slide.line or 0) if c.slide else 0))
+    result = [case for module in modules for case in module.CASES]
+    return tuple(sorted(result, key=lambda c: (c.slide.line or 0) if c.slide else 0))
 
 
 def names() -> list[str]:

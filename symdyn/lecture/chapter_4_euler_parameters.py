@@ -49,7 +49,7 @@ def _diagonal(of: sp.Expr) -> list[sp.Expr]:
     return [2 * (up + of**2 * down) - 1, 1 + cos(phi) + of**2 * (1 - cos(phi)) - 1, (1 - cos(phi)) * of**2 + cos(phi)]
 
 
-def _beside(of: sp.Expr, by: sp.Expr, third: sp.Expr, sign: int) -> list[sp.Expr]:
+def _off_diagonal(of: sp.Expr, by: sp.Expr, third: sp.Expr, sign: int) -> list[sp.Expr]:
     """The steps of another entry after the first; of, by, third: components of the axis."""
     return [2 * (of * by * (1 - cos(phi)) / 2 + sign * third * sin(phi) / 2),
             (1 - cos(phi)) * of * by + sign * third * sin(phi)]
@@ -59,9 +59,11 @@ def _entries() -> list[Formula]:
     """The nine derivations of R(p) = R_a,phi; the first step is the entry of R(p) with p of axis and angle."""
     right = sd.rotation.about(list(a), phi, unit=True)
     half = sd.rotation.parameters_of_axis_angle(list(a), phi, unit=True)
-    lines = [(6860, 0, 0, _diagonal(a_x)), (6862, 0, 1, _beside(a_x, a_y, a_z, -1)), (6872, 0, 2, _beside(a_x, a_z, a_y, 1)),
-             (6874, 1, 0, _beside(a_x, a_y, a_z, 1)), (6884, 1, 1, _diagonal(a_y)), (6886, 1, 2, _beside(a_y, a_z, a_x, -1)),
-             (6896, 2, 0, _beside(a_x, a_z, a_y, -1)), (6898, 2, 1, _beside(a_y, a_z, a_x, 1)), (6908, 2, 2, _diagonal(a_z))]
+    lines = [(6860, 0, 0, _diagonal(a_x)), (6862, 0, 1, _off_diagonal(a_x, a_y, a_z, -1)),
+             (6872, 0, 2, _off_diagonal(a_x, a_z, a_y, 1)), (6874, 1, 0, _off_diagonal(a_x, a_y, a_z, 1)),
+             (6884, 1, 1, _diagonal(a_y)), (6886, 1, 2, _off_diagonal(a_y, a_z, a_x, -1)),
+             (6896, 2, 0, _off_diagonal(a_x, a_z, a_y, -1)), (6898, 2, 1, _off_diagonal(a_y, a_z, a_x, 1)),
+             (6908, 2, 2, _diagonal(a_z))]
     formulas = [
         Formula(f"steps of R_{i + 1}{j + 1}", [R[i, j].xreplace(HALF), *steps], [right[i, j]] * (len(steps) + 1), line=line,
                 latex=f"R_{{{i + 1}{j + 1}}}")

@@ -61,8 +61,8 @@ def _determination() -> list[Formula]:
     grip = sp.Matrix([[0, 0, R_13], [0, 1, R_23], [1, 0, R_33]])
     i, j = sp.Matrix([0, 0, 1]), sp.Matrix([0, 1, 0])
     given = sp.Matrix.hstack(i, j, i.cross(j))
-    found = sd.rotation.to_euler(given, "ZYX")
-    back = sp.Matrix(sd.rotation.from_euler("ZYX", found.at(first=psi)))
+    result = sd.rotation.to_euler(given, "ZYX")
+    back = sp.Matrix(sd.rotation.from_euler("ZYX", result.at(first=psi)))
     n = sp.Symbol("n", integer=True)
     at_lock = sp.Matrix([[0, -sin(psi + phi), -cos(psi + phi)], [0, cos(psi + phi), -sin(psi + phi)], [1, 0, 0]])
     up = proofs.Proof("entry of R", "R_31 = -sin theta must be 1 for n = 0, 1, 2 and 3.",
@@ -77,12 +77,12 @@ def _determination() -> list[Formula]:
                 renamed=dict(zip((R_13, R_23, R_33), given.col(2)))),
         Formula("i of b3", i, back.col(0), line=6527, also=(6542,), latex=r"{}^ni_{b_3}"),
         Formula("j of b3", j, back.col(1), line=6531, also=(6543,), latex=r"{}^nj_{b_3}"),
-        Formula("theta of the grip", -n / 2 * sp.pi, found.angles[1] + 2 * sp.pi * n, line=6549, errata=[quarter],
+        Formula("theta of the grip", -n / 2 * sp.pi, result.angles[1] + 2 * sp.pi * n, line=6549, errata=[quarter],
                 latex=r"\theta_{b_2/b_1}"),
         Formula("R at -90 degrees", at_lock, sd.rotation.from_euler("ZYX", (psi, -sp.pi / 2, phi)), line=6551,
                 latex=r"{}^nR_{b_3}"),
-        Formula("R_12 of the grip", -sin(psi + phi), given[0, 1], line=6551, where={phi: found.at(first=psi)[2]}),
-        Formula("psi + phi of the grip", n * sp.pi, found.value + 2 * sp.pi * n, line=6551, errata=[whole],
+        Formula("R_12 of the grip", -sin(psi + phi), given[0, 1], line=6551, where={phi: result.at(first=psi)[2]}),
+        Formula("psi + phi of the grip", n * sp.pi, result.value + 2 * sp.pi * n, line=6551, errata=[whole],
                 latex=r"\psi_{b_1/n} + \phi_{b_3/b_2}"),
     ]
 

@@ -66,13 +66,13 @@ def _lock() -> list[Formula]:
 def _determination() -> list[Formula]:
     at_lock = sp.Matrix([[0, 0, 1], [sin(phi + psi), cos(phi + psi), 0], [-cos(phi + psi), sin(phi + psi), 0]])
     given = sp.Matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
-    found = sd.rotation.to_euler(given, "XYZ")
+    result = sd.rotation.to_euler(given, "XYZ")
     return [
         Formula("R", R, sd.rotation.from_euler("XYZ", angles), line=6571, latex=r"{}^nR_{b_3}"),
         Formula("R at 90 degrees", at_lock, sd.rotation.from_euler("XYZ", (phi, sp.pi / 2, psi)), line=6579,
                 latex=r"{}^nR_{b_3}"),
-        Formula("theta of the given R", sp.pi / 2, found.angles[1], line=6575, latex=r"\theta"),
-        Formula("phi + psi of the given R", sp.pi / 2, found.value, line=6576, latex=r"\phi + \psi"),
+        Formula("theta of the given R", sp.pi / 2, result.angles[1], line=6575, latex=r"\theta"),
+        Formula("phi + psi of the given R", sp.pi / 2, result.value, line=6576, latex=r"\phi + \psi"),
     ]
 
 

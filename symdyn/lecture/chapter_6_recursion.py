@@ -98,13 +98,13 @@ def turbine() -> Chain:
 
 def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] | None = None) -> list[Formula]:
     """Of three links; lines: of a_k, with f_k^B, f_k and tau_k two lines further each."""
-    found = []
+    result = []
     for link in LINKS:
         line, also = lines[link], [(again[link] + 2 * step,) if again else () for step in range(4)]
         own = chain.resultant(link, chain.system.bodies[link - 1].com)
         # Nothing hangs on the last link: f_4 = 0.
         beyond = times(chain.of("X_star", link + 1), chain.of("f", link + 1)) if link < 3 else sp.zeros(6, 1)
-        found += [
+        result += [
             Formula(f"a_{link}", chain.acceleration(link), chain.of("a", link), line=line, also=also[0],
                     latex=typeset(_acceleration(link))),
             Formula(f"f_{link}^B", chain.own_force(link), own, line=line + 2, also=also[1],
@@ -114,7 +114,7 @@ def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] 
             Formula(f"tau_{link}", times(chain.of("S", link).T, chain.of("f", link)), chain.needed[link - 1], line=line + 6,
                     also=also[3], latex=typeset(f"tau_{link} = S{link}^T f{link}")),
         ]
-    return found
+    return result
 
 
 def of_arm() -> list[Formula]:
@@ -135,14 +135,14 @@ def forward_dynamics() -> list[Formula]:
     chain = arm()
     of = chain.of
     given = {torque: needed[0] for torque, needed in zip(tau, chain.needed, strict=True)}
-    found = []
+    result = []
     for link, line in zip(LINKS, (12314, 12326, 12336), strict=True):
         X, S, c, f = (of(name, link) for name in ("X", "S", "c", "f"))
         I_A, p_A = (of(name, link) for name in (("I", "p") if link == 3 else ("I_A", "p_A")))
         before = chain.a_0 if link == 1 else of("a", link - 1)
         inertia, moved = times(S.T, I_A, S)[0], times(X, before)
         I, p = ("I3", "p3") if link == 3 else (f"I{link}A", f"p{link}A")
-        found += [
+        result += [
             Formula(f"a_{link}", moved + times(S, chain.qdd[link - 1]) + c, of("a", link), line=line,
                     latex=typeset(_acceleration(link))),
             Formula(f"f_{link}", times(I_A, of("a", link)) + p_A, f, line=line + 2, where=given,
@@ -163,7 +163,7 @@ def forward_dynamics() -> list[Formula]:
         force = sp.Matrix([sp.Symbol(f"tau_{link + 1}")]) - times(S.T, times(I_A, c) + p_A)
         n, I, p = link + 1, *(("I3", "p3") if last else ("I2A", "p2A"))
         printed = f"{link}X{n}* {I} S{n} (S{n}^T {I} S{n})^-1"
-        found += [
+        result += [
             Formula(f"I_{link}^A", of("I", link) + times(X_star, I_A, X) - times(back, inverse, S.T, I_A, X), of("I_A", link),
                     line=12344, latex=typeset(f"I{link}A = I{link} + {link}X{n}* {I} {n}X{link}"
                                               f" - {printed} S{n}^T {I} {n}X{link}")),
@@ -172,7 +172,7 @@ def forward_dynamics() -> list[Formula]:
                     latex=typeset(f"p{link}A = p{link} + {link}X{n}* {p} + {link}X{n}* {I} c{n}"
                                   f" + {printed} (tau_{n} - S{n}^T ({I} c{n} + {p}))")),
         ]
-    return found
+    return result
 
 
 def _acceleration(link: int) -> str:

@@ -67,16 +67,16 @@ class Arm:
         """Value of a letter of the slides; see propagation_letters."""
         if name.endswith("^T"):
             return self.letter(name[:-2]).T
-        if found := re.fullmatch(r"(\d)X(\d)(\*?)", name):
-            return getattr(self, f"X_star_{found[2]}" if found[3] else f"X_{found[1]}")
-        if found := re.fullmatch(r"q(\d)('{1,2})", name):
-            return (self.q_dot if len(found[2]) == 1 else self.q_ddot)[int(found[1]) - 1]
-        if found := re.fullmatch(r"tau_(\d)", name):
-            return self.tau[int(found[1]) - 1]
-        if found := re.fullmatch(r"f(\d)B", name):
-            return self.f_B(int(found[1]))
-        if found := re.fullmatch(r"([acfpIS])(\d)(A?)", name):
-            return getattr(self, "_".join(part for part in (found[1], found[3], found[2]) if part))
+        if result := re.fullmatch(r"(\d)X(\d)(\*?)", name):
+            return getattr(self, f"X_star_{result[2]}" if result[3] else f"X_{result[1]}")
+        if result := re.fullmatch(r"q(\d)('{1,2})", name):
+            return (self.q_dot if len(result[2]) == 1 else self.q_ddot)[int(result[1]) - 1]
+        if result := re.fullmatch(r"tau_(\d)", name):
+            return self.tau[int(result[1]) - 1]
+        if result := re.fullmatch(r"f(\d)B", name):
+            return self.f_B(int(result[1]))
+        if result := re.fullmatch(r"([acfpIS])(\d)(A?)", name):
+            return getattr(self, "_".join(part for part in (result[1], result[3], result[2]) if part))
         if name in _OF_LINK_2:
             return _OF_LINK_2[name](self)
         return getattr(self, name)

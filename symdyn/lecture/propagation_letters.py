@@ -45,10 +45,10 @@ def typeset(text: str) -> str:
 def evaluated(text: str, letter: Callable[[str], Any]) -> Any:
     """Value of the right side, or of the only one; letter: gives the value of a letter."""
     tokens = _tokens(text.rpartition("=")[2])
-    found = _sum(tokens, letter)
+    result = _sum(tokens, letter)
     if tokens:
         raise ValueError(f"{text!r} goes on with {' '.join(tokens)!r} after its end; brackets come in pairs")
-    return found
+    return result
 
 
 def both_sides(text: str, letter: Callable[[str], Any]) -> tuple[Any, Any]:
@@ -63,8 +63,8 @@ def _tokens(text: str) -> list[str]:
 
 def _short(token: str) -> str:
     for pattern, made in _SHORT:
-        if found := re.fullmatch(pattern, token):
-            return made(found)
+        if result := re.fullmatch(pattern, token):
+            return made(result)
     raise ValueError(f"there is no letter {token!r} in chapters 5.7, 5.8 and 6.4; write it as in 'f1 = I1 a1 + p1 + 1X2* f2'")
 
 

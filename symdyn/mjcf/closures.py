@@ -80,11 +80,11 @@ class Closures:
             if number not in self.tree.coordinates:
                 return sp.S.Zero
             return self.tree.coordinates[number] - plain(float(self.m.qpos0[self.c.joint(number)[1]]))
-        found = self.forces.length(number)
-        if found is None:
+        result = self.forces.length(number)
+        if result is None:
             self.out.rejected("equality", e, "couples a tendon that wraps around geoms or pulleys")
             return None
-        return found[0] - plain(float(self.m.tendon_length0[number]))
+        return result[0] - plain(float(self.m.tendon_length0[number]))
 
 
 def _plain(values: Any) -> list[Any]:

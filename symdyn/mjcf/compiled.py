@@ -55,10 +55,10 @@ class Compiled:
 
     def _rejection(self, message: str) -> str:
         said, _, rest = message.partition("\n")
-        found = re.search(r"line (\d+)", rest) or re.search(r"line (\d+)", said)
+        result = re.search(r"line (\d+)", rest) or re.search(r"line (\d+)", said)
         name = re.search(r"[Ee]lement (?:name )?'([^']+)'", rest)
         about = f" in {name[1]!r}" if name else ""
-        return (f"{self.expanded.where(self.path, int(found[1]) if found else 0)}: MuJoCo rejects the model{about}: "
+        return (f"{self.expanded.where(self.path, int(result[1]) if result else 0)}: MuJoCo rejects the model{about}: "
                 f"{said.removeprefix('XML ').removeprefix('Error: ').strip()}")
 
     def name(self, kind: str, number: int) -> str:
@@ -67,8 +67,8 @@ class Compiled:
 
     def where(self, kind: str, number: int) -> str:
         """FILE:LINE of an element."""
-        found = re.search(r"line (\d+)", self.lines[kind].get(number, ""))
-        return self.expanded.where(self.path, int(found[1]) if found else 0)
+        result = re.search(r"line (\d+)", self.lines[kind].get(number, ""))
+        return self.expanded.where(self.path, int(result[1]) if result else 0)
 
     def fault(self, kind: str, number: int, text: str) -> None:
         """A fault of an element."""

@@ -81,18 +81,18 @@ class Reader:
                 self._put_in(child, path, chain)
                 taken.append(child)
                 continue
-            found = self._inside(child, "file", path, self.path.parent)
-            if found is None:
+            result = self._inside(child, "file", path, self.path.parent)
+            if result is None:
                 continue
-            if found in chain or len(chain) > _DEEPEST:
+            if result in chain or len(chain) > _DEEPEST:
                 self._at(path, child.line, f"<include> of {shown(child.attributes['file'])} leads back to a file that it is in; "
                                            "leave it out")
                 continue
-            inner = read_document(found, KIND)
-            self._put_in(inner, found, (*chain, found))
+            inner = read_document(result, KIND)
+            self._put_in(inner, result, (*chain, result))
             for element in inner.children:
                 for each in element.everything():
-                    self.sources.setdefault(id(each), found)
+                    self.sources.setdefault(id(each), result)
             taken += inner.children
         parent.children[:] = taken
 
@@ -114,15 +114,15 @@ class Reader:
         if "://" in name or ":" in name or "\\" in name or "\0" in name:
             self._at(path, element.line, f"{what}; write the path of a file with / between its parts, inside {self.folder}")
             return None
-        found = (base / name).resolve()
-        if not found.is_relative_to(self.folder):
+        result = (base / name).resolve()
+        if not result.is_relative_to(self.folder):
             self._at(path, element.line, f"{what}, which is outside of the folder {self.folder}; pass folder=... with one that "
                                          "holds all files of the model")
             return None
-        if not found.is_file():
-            self._at(path, element.line, f"{what}, and there is no file {found}")
+        if not result.is_file():
+            self._at(path, element.line, f"{what}, and there is no file {result}")
             return None
-        return found
+        return result
 
     def _asset(self, element: Element, path: Path) -> str:
         """The absolute path of the file of a mesh or a height field."""
@@ -131,8 +131,8 @@ class Reader:
             name = PurePosixPath(name.replace("\\", "/")).name
         folder = next((self.compiler[a] for a in _FOLDERS[element.tag] if self.compiler.get(a)), "")
         taken = Element(element.tag, {**element.attributes, "file": name}, element.line)
-        found = self._inside(taken, "file", path, self.path.parent / folder)
-        return "" if found is None else str(found)
+        result = self._inside(taken, "file", path, self.path.parent / folder)
+        return "" if result is None else str(result)
 
     # -- the text
 

@@ -37,13 +37,13 @@ class Equalities:
             yield from self._constraint(constraint.name, constraint.expression)
 
     def _dependent(self, scalar: Scalar) -> Iterator[str]:
-        found = self.numbers.multiple(scalar.coordinate, self.owners)
-        if found is None:
+        result = self.numbers.multiple(scalar.coordinate, self.owners)
+        if result is None:
             self.faults.append(f"joint {shown(scalar.name)} has the coordinate {scalar.coordinate}; written are coordinates of "
                                "its own, "
                                "and multiples of another's plus a number")
             return
-        source, factor, offset = found
+        source, factor, offset = result
         yield self._joint(scalar.name, scalar.name, source.name, [offset, factor])
 
     def _loop(self, loop: Any) -> Iterator[str]:

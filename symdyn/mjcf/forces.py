@@ -142,12 +142,12 @@ class Forces:
         sprung, damped = self.springs and (stiffness or higher.any()), self.dampers and (d or more.any())
         if not (sprung or damped or J) or self.out.named(name):
             return
-        found = self.length(k)
-        if found is None or (J and not self._fixed(k)):
-            self.out.rejected("tendon", k, "wraps around geoms or pulleys" if found is None
+        result = self.length(k)
+        if result is None or (J and not self._fixed(k)):
+            self.out.rejected("tendon", k, "wraps around geoms or pulleys" if result is None
                               else "goes through sites and has an armature")
             return
-        length, rate = found
+        length, rate = result
         force = sp.S.Zero
         if sprung:
             low, high = (plain(float(v)) for v in m.tendon_lengthspring[k])
@@ -213,10 +213,10 @@ class Forces:
         """Length and rate of what an actuator moves, before its gear, (None, None) where they are no scalars; None where that is
         held or rejected."""
         if transmission == "TENDON":
-            found = self.length(target)
-            if found is None:
+            result = self.length(target)
+            if result is None:
                 self.out.rejected("actuator", i, "pulls at a tendon that wraps around geoms or pulleys")
-            return found
+            return result
         if transmission == "SITE":
             if int(self.m.actuator_trnid[i, 1]) >= 0:
                 self.out.rejected("actuator", i, "acts between two sites (refsite)")

@@ -18,15 +18,15 @@ def draw(tree: Tree) -> None:
     out."""
     m = tree.m
     for g in range(m.ngeom):
-        found = _triangles(tree, g)
-        if found is None or m.geom_group[g] >= _SHOWN:
+        result = _triangles(tree, g)
+        if result is None or m.geom_group[g] >= _SHOWN:
             continue
         rgba = m.mat_rgba[m.geom_matid[g]] if m.geom_matid[g] >= 0 else m.geom_rgba[g]
         if rgba[3] == 0:
             continue
-        vertices = found[0] @ rotation(m.geom_quat[g]).T + m.geom_pos[g]
-        tree.system.draw(tree.bodies[int(m.geom_bodyid[g])], Mesh(vertices, found[1]), color=[float(np.clip(v, 0, 1)) for v in
-                                                                                              rgba[:3]])
+        vertices = result[0] @ rotation(m.geom_quat[g]).T + m.geom_pos[g]
+        tree.system.draw(tree.bodies[int(m.geom_bodyid[g])], Mesh(vertices, result[1]), color=[float(np.clip(v, 0, 1)) for v in
+                                                                                               rgba[:3]])
 
 
 def _triangles(tree: Tree, g: int) -> Triangles | None:

@@ -104,7 +104,7 @@ def read_mjcf(path: str | Path, symbolic: str | Sequence[str] = (), name: str | 
 def _folder(folder: Any, default: Path | None) -> Path | None:
     if folder is None:
         return default
-    found = as_path(folder, "the folder of an MJCF")
-    if not found.is_dir():
+    result = as_path(folder, "the folder of an MJCF")
+    if not result.is_dir():
         raise ArgumentError(f"folder is {shown(str(folder))}, which is no folder; pass one that holds all files of the model")
-    return found
+    return result

@@ -26,15 +26,15 @@ def set_start(tree: Tree, keyframe: str | None) -> None:
                                  f"{nearest(keyframe, names)}")
         return
     k = names.index(wanted)
-    found: dict[Any, float] = {}
+    result: dict[Any, float] = {}
     for j, joint in tree.joints.items():
         _, q_at, u_at = tree.c.joint(j)
-        found |= zip(joint.coordinates, map(float, m.key_qpos[k][q_at:]), strict=False)
-        found |= zip(joint_speeds(joint), map(float, m.key_qvel[k][u_at:]), strict=False)
+        result |= zip(joint.coordinates, map(float, m.key_qpos[k][q_at:]), strict=False)
+        result |= zip(joint_speeds(joint), map(float, m.key_qvel[k][u_at:]), strict=False)
     for i in range(m.nu):
         symbol = tree.commands.get(i)
         if symbol is not None:
-            found[symbol] = float(m.key_ctrl[k][i])
+            result[symbol] = float(m.key_ctrl[k][i])
     for i, state in tree.activations.items():
-        found[state] = float(m.key_act[k][int(m.actuator_actadr[i])])
-    tree.system.initial.update(found)
+        result[state] = float(m.key_act[k][int(m.actuator_actadr[i])])
+    tree.system.initial.update(result)

@@ -111,9 +111,9 @@ class Tree:
         kind, at, _ = self.c.joint(j)
         called = self.joint_names.text(name)
         if kind == "free":
-            found = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
-            made: Joint = Free(called, self.system.ground, child, found, orientation=EulerParameters())
-            self._start(found, m.qpos0[at:at + 7])
+            result = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
+            made: Joint = Free(called, self.system.ground, child, result, orientation=EulerParameters())
+            self._start(result, m.qpos0[at:at + 7])
         else:
             anchor = [self.parameters.take(f"a_{axis}", name, float(v)) for axis, v in zip("xyz", m.jnt_pos[j])]
             axis = np.array(m.jnt_axis[j])
@@ -122,8 +122,8 @@ class Tree:
             point = [p + sum((plain(float(R[i, k])) * seat[k] for k in range(3)), 0) for i, p in enumerate(point)]
             placed: dict[str, Any] = {"parent_point": point, "child_point": anchor}
             if kind == "ball":
-                found = [self._coordinate(letters, name) for letters in ("e0", "e1", "e2", "e3")]
-                made = Spherical(called, parent, child, found, orientation=EulerParameters(), parent_rotation=_rows(R), **placed)
+                result = [self._coordinate(letters, name) for letters in ("e0", "e1", "e2", "e3")]
+                made = Spherical(called, parent, child, result, orientation=EulerParameters(), parent_rotation=_rows(R), **placed)
             else:
                 turned = R @ _about(axis, -reference) if kind == "hinge" and reference else R
                 of = Revolute if kind == "hinge" else Prismatic

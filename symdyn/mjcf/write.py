@@ -157,10 +157,10 @@ class _Writer:
             if not isinstance(joint, (Revolute, Prismatic)) or self.model.parents[k] != -1 or self.below.get(child) or \
                     isinstance(joint.coordinates[0], Coordinate) or {body.name, joint.name} & named:
                 continue
-            found = self.numbers.multiple(joint.coordinates[0], self.owners)
+            result = self.numbers.multiple(joint.coordinates[0], self.owners)
             axis = self.numbers.array(joint.axis).ravel()
             com = self.numbers.array(body.com).ravel() - self.numbers.array(joint.child_point).ravel()
-            if found is None or (isinstance(joint, Revolute) and np.cross(com, axis).any()):
+            if result is None or (isinstance(joint, Revolute) and np.cross(com, axis).any()):
                 continue
             if isinstance(joint, Prismatic):
                 world = self.numbers.array(joint.parent_rotation) @ axis
@@ -170,7 +170,7 @@ class _Writer:
             else:
                 turned = self.numbers.array(joint.child_rotation) @ axis
                 inertia = float(turned @ self.numbers.array(body.inertia) @ turned)
-            source, factor, _ = found
+            source, factor, _ = result
             self.armature[source.name] = self.armature.get(source.name, 0.0) + inertia * factor**2
             self.rotors.add(k)
 

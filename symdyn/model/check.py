@@ -146,12 +146,12 @@ class _Checker:
     # -- tree
 
     def _resolve(self, body: Any, where: str, carried: bool = True) -> int | None:
-        found = self.known.get(body) if isinstance(body, str) else body
-        if isinstance(found, Body) and id(found) in self.index:
-            if carried and id(found) in self.idle_ends:
-                self.faults.append(f"{where} is {shown(found.name)}, the free end of a flexible body, which was added with "
+        result = self.known.get(body) if isinstance(body, str) else body
+        if isinstance(result, Body) and id(result) in self.index:
+            if carried and id(result) in self.idle_ends:
+                self.faults.append(f"{where} is {shown(result.name)}, the free end of a flexible body, which was added with "
                                    "carries=False and stays at the clamped end; leave carries out")
-            return self.index[id(found)]
+            return self.index[id(result)]
         name, what = (body.name, "is a body of another system") if isinstance(body, Body) else (body, "is no body of the system")
         self.faults.append(f"{where} is {shown(name)}, which {what}; bodies: {', '.join(self.known)}"
                            f"{self._nearest(name, self.known)}")

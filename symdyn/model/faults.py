@@ -169,5 +169,5 @@ def _is_row(value: Any) -> bool:
 
 def plain_unit(unit: str) -> str:
     """A unit in plain text: "kg·m²" as "kg m^2"."""
-    raised = re.sub(f"[{''.join(_RAISED)}]+", lambda found: "^" + "".join(_RAISED[c] for c in found[0]), unit)
+    raised = re.sub(f"[{''.join(_RAISED)}]+", lambda result: "^" + "".join(_RAISED[c] for c in result[0]), unit)
     return raised.translate(_SIGNS).replace("**", "^")

@@ -96,7 +96,7 @@ def idle_coordinate_faults(loops: Iterable[Joint | Gear], used: Iterable[sp.Basi
 
 def _gear_faults(gear: Gear, joints: Mapping[str, Joint]) -> list[str]:
     faults = []
-    found = []
+    result = []
     for end in (gear.joint_a, gear.joint_b):
         joint = joints.get(end) if isinstance(end, str) else end
         if joint not in joints.values():
@@ -106,8 +106,8 @@ def _gear_faults(gear: Gear, joints: Mapping[str, Joint]) -> list[str]:
             faults.append(f"gear {shown(gear.name)}: joint {shown(joint.name)} has {len(joint.coordinates)} coordinates; a "
                           "gear joins "
                           "joints with one each")
-        found.append(joint)
-    if not faults and found[0] is found[1]:
+        result.append(joint)
+    if not faults and result[0] is result[1]:
         faults.append(f"gear {shown(gear.name)} joins joint {shown(gear.joint_a)} to itself; pass two different joints")
     return faults
 

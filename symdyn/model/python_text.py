@@ -36,11 +36,11 @@ def text_of(function: Any, n: int, given: str, what: str, faults: list[str]) -> 
     except SyntaxError as error:
         faults.append(f"{what}: its text is no Python of its own: {error.msg} in line {error.lineno}")
         return ""
-    found = [s for s in tree.body if isinstance(s, ast.FunctionDef) and s.name == function.__name__]
-    if not found:
+    result = [s for s in tree.body if isinstance(s, ast.FunctionDef) and s.name == function.__name__]
+    if not result:
         faults.append(f"{what}: its text does not define it; it must hold def {function.__name__}(...)")
         return ""
-    taken = found[-1].args
+    taken = result[-1].args
     if len([*taken.posonlyargs, *taken.args]) != n or taken.vararg or taken.kwonlyargs or taken.kwarg or taken.defaults:
         faults.append(f"{what} takes ({ast.unparse(taken)}); it must take {n} argument{'s' * (n > 1)}, without defaults")
     missing = sorted(set(_missing(symtable.symtable(text, what, "exec"))))

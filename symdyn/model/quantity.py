@@ -232,8 +232,8 @@ def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.Immutabl
 def quantities_in(expressions: Iterable[Any]) -> list[Quantity]:
     """The quantities in some expressions, each once, in the order of their names."""
     made_of = [e for e in expressions if isinstance(e, sp.Basic) and (e.args or isinstance(e, Quantity))]
-    found = {part for part in parts_of(*made_of) if isinstance(part, Quantity)}
-    return sorted(found, key=lambda q: (q.name, str(q.measure)))
+    result = {part for part in parts_of(*made_of) if isinstance(part, Quantity)}
+    return sorted(result, key=lambda q: (q.name, str(q.measure)))
 
 
 def of_speeds(symbol: sp.Basic) -> bool:

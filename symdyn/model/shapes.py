@@ -59,18 +59,19 @@ class Box(Shape):
     def values(self, faults: Faults, what: str, planar: bool) -> dict[str, tuple[Row, ...]]:
         size = tuple(faults.vector(self.size, f"{what}: size"))
         _positive(faults, size, f"{what}: size")
-        found: dict[str, tuple[Row, ...]] = {"size": (size,), "center": (_point(faults, self.center, f"{what}: center", planar),)}
+        center = _point(faults, self.center, f"{what}: center", planar)
+        result: dict[str, tuple[Row, ...]] = {"size": (size,), "center": (center,)}
         if self.hole is not None:
             hole = faults.expressions(self.hole, f"{what}: hole")
             if len(hole) != 2:
                 faults.append(f"{what}: hole has {len(hole)} components; pass 2, its lengths along x and y")
-                return found
+                return result
             _positive(faults, hole, f"{what}: hole")
             for k, axis in enumerate("xy"):
                 if (hole[k] - size[k]).is_nonnegative:
                     faults.append(f"{what}: hole is {hole[k]} m long along {axis}, and the box {size[k]} m; make it smaller")
-            found["hole"] = (hole,)
-        return found
+            result["hole"] = (hole,)
+        return result
 
     @property
     def about(self) -> dict[str, Any]:
@@ -252,7 +253,7 @@ class Water(Shape):
     def values(self, faults: Faults, what: str, planar: bool) -> dict[str, tuple[Row, ...]]:
         if planar:
             faults.append(f"{what}: a water surface z = level is in sight in systems in space only; leave it out")
-        found: dict[str, tuple[Row, ...]] = {"level": ((faults.expression(self.level, f"{what}: level"),),)}
+        result: dict[str, tuple[Row, ...]] = {"level": ((faults.expression(self.level, f"{what}: level"),),)}
         if self.waves is not None:
             waves = faults.expressions(self.waves, f"{what}: waves")
             if len(waves) not in (3, 5):
@@ -260,9 +261,9 @@ class Water(Shape):
                               "(amplitude, frequency, length, heading, ramp)")
             else:
                 _positive(faults, waves[2:3], f"{what}: length of waves")
-                found["waves"] = (waves if len(waves) == 5 else (*waves, sp.S.Zero, sp.S.Zero),)
+                result["waves"] = (waves if len(waves) == 5 else (*waves, sp.S.Zero, sp.S.Zero),)
         if self.size is None:
-            return found
+            return result
         size = faults.expressions(self.size, f"{what}: size")
         size = size * 2 if len(size) == 1 else size
         center = faults.expressions(self.center, f"{what}: center")
@@ -270,7 +271,7 @@ class Water(Shape):
             if len(value) != 2:
                 faults.append(f"{what}: {name} has {len(value)} components; pass 2, along x and y")
         _positive(faults, size, f"{what}: size")
-        return {**found, "size": (size,), "center": (center,)}
+        return {**result, "size": (size,), "center": (center,)}
 
     @property
     def about(self) -> dict[str, Any]:
@@ -318,7 +319,7 @@ def drawn(faults: Faults, body: Any, shapes: Sequence[Any], color: Any, planar: 
         color = None
     if not shapes:
         faults.append(f"draw was given no shape for {shown(name)}; pass shapes such as sd.shapes.Box([2, 1, 1])")
-    found = []
+    result = []
     for shape in shapes:
         if not isinstance(shape, Shape):
             faults.append(f"draw: a shape of {shown(name)} is {shown(shape)}; pass shapes such as sd.shapes.Box([2, 1, 1])")
@@ -326,8 +327,8 @@ def drawn(faults: Faults, body: Any, shapes: Sequence[Any], color: Any, planar: 
         what = f"{type(shape).__name__} of {shown(name)}"
         if isinstance(shape, Water) and name != "ground":
             faults.append(f"{what}: the water surface stays in place; draw it on system.ground")
-        found.append(Drawn(body, what, color, shape.values(faults, what, planar), shape.about))
-    return found
+        result.append(Drawn(body, what, color, shape.values(faults, what, planar), shape.about))
+    return result
 
 
 def _point(faults: Faults, value: Any, what: str, planar: bool) -> Row:

@@ -34,8 +34,8 @@ def surroundings_of(system: System, loads: Iterable[Any], parameters: Iterable[s
     """What the contacts and mooring lines of a checked system show; what follows from other symbols than parameters is left
     out."""
     known = set(parameters)
-    found = [*_counterparts(system), *(_line(load) for load in loads if isinstance(load, MooringLine))]
-    return tuple(one for one in found if all(symbols_of(e) <= known for e in one.expressions))
+    result = [*_counterparts(system), *(_line(load) for load in loads if isinstance(load, MooringLine))]
+    return tuple(one for one in result if all(symbols_of(e) <= known for e in one.expressions))
 
 
 def _counterparts(system: System) -> Iterator[Drawn]:

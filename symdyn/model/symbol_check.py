@@ -34,11 +34,11 @@ def check_coordinates(s: System, joints: Sequence[Joint], faults: Faults) -> tup
         independent = [isinstance(q, Coordinate) for q in joint.coordinates]
         if joint.symbols_only and not all(independent) and not joint.faults:
             faults.append(f"joint {shown(joint.name)}: {joint.symbols_only}")
-        for place, q in enumerate(joint.coordinates):
+        for index, q in enumerate(joint.coordinates):
             if not isinstance(q, Coordinate):
                 continue
             if q in driver:
-                independent[place] = False
+                independent[index] = False
                 faults.append(
                     f"joints {shown(driver[q].name)} and {shown(joint.name)} both drive the coordinate {q}; give each its own, "
                     f"or write one as an expression (gear: 2*{q}; mimic: sympy.UnevaluatedExpr({q}))")
@@ -119,8 +119,8 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
                               f"{described(named[symbol.name])}; use the same symbol in both (SymPy's q(t) stands for a "
                               "coordinate without assumptions)")
             elif isinstance(symbol, (Coordinate, Rate)):
-                found = ", ".join(map(str, coordinates)) or "none"
-                faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {found}; "
+                result = ", ".join(map(str, coordinates)) or "none"
+                faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {result}; "
                               f"give {symbol} a joint, or system.add_coordinate({symbol}) where it stands in expressions of "
                               "joints alone, or use a parameter or input in its place")
             elif isinstance(symbol, Input):
@@ -149,11 +149,11 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
     names = Counter(a.name for a in everything)
     for name, count in names.items():
         if count > 1:
-            found = " and ".join(described(a) for a in everything if a.name == name)
+            result = " and ".join(described(a) for a in everything if a.name == name)
             plain = any(type(a) is sp.Symbol for a in everything if a.name == name)
             moves = plain and any(isinstance(a, Coordinate) for a in everything if a.name == name)
             once = f", by sd.coordinates({name!r}) where it moves," if moves else ","
-            faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {found}; "
+            faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {result}; "
                           f"make each symbol once{once} or give them different names")
     if "t" in names:
         faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
@@ -199,8 +199,8 @@ def spelling(faults: Faults, what: str, names: Iterable[Any]) -> None:
 
 def symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
     """Free symbols in order of the expressions, by name within one expression."""
-    found: dict[sp.Symbol, None] = {}
+    result: dict[sp.Symbol, None] = {}
     for e in expressions:
         for symbol in sorted(symbols_of(e), key=lambda a: a.name):
-            found[symbol] = None
-    return list(found)
+            result[symbol] = None
+    return list(result)

@@ -165,13 +165,13 @@ class GivenAcceleration(Input):
 
 def with_rates(inputs: Iterable[Input]) -> tuple[Input, ...]:
     """Inputs in their order, each motion among them together with its rate and acceleration, whichever of them is used."""
-    found: dict[Input, None] = {}
+    result: dict[Input, None] = {}
     for symbol in inputs:
         if isinstance(symbol, (GivenRate, GivenAcceleration)):
             name = symbol.name.removesuffix("_dot" if isinstance(symbol, GivenRate) else "_ddot")
             symbol = GivenMotion(name, **symbol._assumptions_orig)
-        found.update(dict.fromkeys([symbol, symbol.dot, symbol.ddot] if isinstance(symbol, GivenMotion) else [symbol]))
-    return tuple(found)
+        result.update(dict.fromkeys([symbol, symbol.dot, symbol.ddot] if isinstance(symbol, GivenMotion) else [symbol]))
+    return tuple(result)
 
 
 def _make(kind: type, names: str, assumptions: dict) -> Any:
@@ -340,14 +340,14 @@ def _taken(value: Any, what: str) -> sp.Expr:
 
 def parts_of(*expressions: sp.Basic) -> set[sp.Basic]:
     """The expressions and all that they are made of, each once."""
-    found: set[sp.Basic] = set()
+    result: set[sp.Basic] = set()
     left = list(expressions)
     while left:
         part = left.pop()
-        if part not in found:
-            found.add(part)
+        if part not in result:
+            result.add(part)
             left.extend(part.args)
-    return found
+    return result
 
 
 @cache
@@ -374,10 +374,10 @@ def finite(value: Any) -> float | None:
     if not isinstance(value, (int, float)) and not (isinstance(value, sp.Expr) and value.is_number):
         return None
     try:
-        found = float(value)
+        result = float(value)
     except (OverflowError, TypeError, ValueError):
         return None
-    return found if math.isfinite(found) else None
+    return result if math.isfinite(result) else None
 
 
 def take_over(expression: sp.Basic) -> Any:

@@ -93,10 +93,10 @@ def _through(motion: Solution, ends: np.ndarray) -> tuple[PPoly, PPoly, np.ndarr
     """States and inputs as polynomials between the ends, and how far these are from the motion, as parts of the largest (K,)."""
     h, shares = np.diff(ends), np.append(INNER, BETWEEN)
     t = ends[:-1, None] + h[:, None] * shares
-    left, found = np.zeros(len(h)), []
+    left, result = np.zeros(len(h)), []
     for values in motion.states_and_inputs(t):
         made = PPoly(through(INNER, values[:, :len(INNER)], h), ends)
         off = np.abs(made(t[:, len(INNER):]) - values[:, len(INNER):]) / (np.abs(values).max(axis=(0, 1)) + 1e-300)
         left = np.maximum(left, np.nan_to_num(off, nan=np.inf).max(axis=(1, 2), initial=0.0))
-        found.append(made)
-    return found[0], found[1], left
+        result.append(made)
+    return result[0], result[1], left

@@ -114,7 +114,7 @@ class Discretized:
         return Motion(z[at.X], z[at.U], p, float(z[at.duration]) if at.duration >= 0 else float(self.problem.duration[0]))
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        at, problem, found = self.layout, self.problem, []
+        at, problem, result = self.layout, self.problem, []
         for k, worst in ((0, -np.inf), (1, np.inf)):
             z = np.full(at.n, worst)
             z[at.X], z[at.U], z[at.params] = problem.states[k], problem.inputs[k], problem.params[k]
@@ -123,19 +123,19 @@ class Discretized:
                 z[at.X[self.mesh.ends[-1]]] = problem.end[k]
             if at.duration >= 0:
                 z[at.duration] = problem.duration[k]
-            found.append(z)
-        return found[0], found[1]
+            result.append(z)
+        return result[0], result[1]
 
     # -- sizes
 
     def _sizes_of_variables(self, sizes: Sizes) -> np.ndarray:
-        at, found = self.layout, np.ones(self.layout.n)
-        found[at.X], found[at.U], found[at.params] = sizes.x, sizes.inputs, sizes.params
+        at, result = self.layout, np.ones(self.layout.n)
+        result[at.X], result[at.U], result[at.params] = sizes.x, sizes.inputs, sizes.params
         if at.corrections.size:
-            found[at.corrections] = 1 / np.linalg.norm(self.normals / sizes.x[:, None], axis=1)
+            result[at.corrections] = 1 / np.linalg.norm(self.normals / sizes.x[:, None], axis=1)
         if at.duration >= 0:
-            found[at.duration] = sizes.duration
-        return unit(found)
+            result[at.duration] = sizes.duration
+        return unit(result)
 
     def _nearby(self, z_least: np.ndarray, z_most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The guess, and variables nearby."""
@@ -146,7 +146,7 @@ class Discretized:
         """What variables of their sizes change each row by, (m,): by its linear part; without one by its derivatives, the largest
         at all times; else what it is."""
         linear = abs(program.L) @ sp.diags(self.z_sizes[:program.n])
-        found = np.asarray(linear.max(axis=1).todense()).ravel() if program.L.nnz else np.zeros(program.m)
+        result = np.asarray(linear.max(axis=1).todense()).ravel() if program.L.nnz else np.zeros(program.m)
         curved = np.zeros(program.m)
         for z in self._nearby(program.z_least, program.z_most):
             J = np.nan_to_num(np.abs(program.jacobian(z)), nan=0.0, posinf=0.0) * self.z_sizes[program.jacobian_columns]
@@ -157,8 +157,8 @@ class Discretized:
             for of in (curved, there):
                 of[rows] = np.tile(of[rows].reshape(-1, len(label.entries)).max(axis=0, initial=0.0), len(label.shares))
         for other in (curved, there, np.ones(program.m)):
-            found = np.where(found > 0, found, other)
-        return unit(found)
+            result = np.where(result > 0, result, other)
+        return unit(result)
 
     def _size_of_cost(self) -> float:
         """What variables of their sizes change the cost by, at the guess or nearby."""
@@ -321,7 +321,7 @@ class Discretized:
         N, at = len(states), self.layout
         columns = np.hstack([at.X[states], at.U[inputs], np.broadcast_to(at.params, (N, len(at.params)))])
         block = self._pointwise(of.expressions, columns, shares, sp.identity(N * m, format="csr"), np.zeros(N * m))
-        found = [_Part(N * m, None, block, np.tile(of.least, N), np.tile(of.most, N), [Label("", 0, shares, of.texts, True)])]
+        result = [_Part(N * m, None, block, np.tile(of.least, N), np.tile(of.most, N), [Label("", 0, shares, of.texts, True)])]
         n_x, n_in = self.problem.of.n_x, self.problem.of.n_in
         without = np.flatnonzero(~of.expressions.slopes[:, n_x:n_x + n_in].any(axis=1))
         if shares[0] > 0 and len(without):  # at the start there are no inputs
@@ -329,22 +329,22 @@ class Discretized:
             A = sp.csr_matrix((np.ones(len(without)), (np.arange(len(without)), without)), (len(without), m))
             block = self._pointwise(of.expressions, columns, np.zeros(1), A, np.zeros(m))
             texts = tuple(of.texts[k] for k in without)
-            found.insert(0, _Part(len(without), None, block, of.least[without], of.most[without],
-                                  [Label("", 0, np.zeros(1), texts, True)]))
-        return found
+            result.insert(0, _Part(len(without), None, block, of.least[without], of.most[without],
+                                   [Label("", 0, np.zeros(1), texts, True)]))
+        return result
 
     def _boundary(self) -> list[_Part]:
         at, problem = self.layout, self.problem
         columns = np.concatenate([at.X[0], at.X[self.mesh.ends[-1]], at.U[-1], at.params])[None, :]
         of, end = problem.boundary, problem.end_cost
-        found = []
+        result = []
         if of.expressions.m:
             m = of.expressions.m
             block = self._pointwise(of.expressions, columns, np.ones(1), sp.identity(m, format="csr"), np.zeros(m))
-            found.append(_Part(m, None, block, of.least, of.most, [Label("", 0, np.array([np.nan]), of.texts, True)]))
+            result.append(_Part(m, None, block, of.least, of.most, [Label("", 0, np.array([np.nan]), of.texts, True)]))
         block = self._pointwise(end, columns, np.ones(1), sp.csr_matrix((0, 1)), np.ones(1))
-        found.append(_Part(0, None, block, np.zeros(0), np.zeros(0), []))
-        return found
+        result.append(_Part(0, None, block, np.zeros(0), np.zeros(0), []))
+        return result
 
     def _end(self) -> _Part:
         """The end as conditions, that may be missed."""
@@ -357,7 +357,7 @@ class Discretized:
 
     def _rates(self) -> list[_Part]:
         mesh, at, (low, high) = self.mesh, self.layout, self.problem.rates
-        found = []
+        result = []
         for k, name in enumerate(self.problem.module.metadata.inputs):
             if not (np.isfinite(low[k]) or np.isfinite(high[k])):
                 continue
@@ -371,17 +371,17 @@ class Discretized:
                         rate = rate - sp.csr_matrix((np.full(m, bound), (np.arange(m), np.full(m, at.duration))), rate.shape)
                     else:
                         shift = bound * self.problem.duration[0]
-                    found.append(_Part(m, rate, None, np.full(m, least + shift), np.full(m, most + shift),
-                                       [Label(text, 0, shares)]))
+                    result.append(_Part(m, rate, None, np.full(m, least + shift), np.full(m, most + shift),
+                                        [Label(text, 0, shares)]))
             joints = self._of_input(mesh.joints, k)
-            found.append(_Part(joints.shape[0], joints, None, np.zeros(joints.shape[0]), np.zeros(joints.shape[0]),
-                               [Label(f"the continuity of {name}", 0, mesh.breaks[1:1 + joints.shape[0]])]))
-        return found
+            result.append(_Part(joints.shape[0], joints, None, np.zeros(joints.shape[0]), np.zeros(joints.shape[0]),
+                                [Label(f"the continuity of {name}", 0, mesh.breaks[1:1 + joints.shape[0]])]))
+        return result
 
     def _of_input(self, matrix: sp.csr_matrix, k: int) -> sp.csr_matrix:
         """A matrix on the samples of one input as one on z."""
-        found = matrix.tocoo()
-        return sp.csr_matrix((found.data, (found.row, self.layout.U[found.col, k])), (found.shape[0], self.layout.n))
+        result = matrix.tocoo()
+        return sp.csr_matrix((result.data, (result.row, self.layout.U[result.col, k])), (result.shape[0], self.layout.n))
 
     def _loops(self) -> list[_Part]:
         rows, mesh, at, problem = self.rows_of_loops, self.mesh, self.layout, self.problem
@@ -503,20 +503,20 @@ class Discretized:
         for point in (self.z, z):
             used |= program.gradient(point) != 0
             used[program.jacobian_columns[program.jacobian(point) != 0]] = True
-        found = {name: where for name, where in groups.items() if moving[where].any() and not used[where].any()}
-        if found:
+        result = {name: where for name, where in groups.items() if moving[where].any() and not used[where].any()}
+        if result:
             curved = program.hessian(z, 1.0, np.ones(program.m)) != 0
             used[program.hessian_rows[curved]] = used[program.hessian_columns[curved]] = True
-        return {name: where for name, where in found.items() if not used[where].any()}
+        return {name: where for name, where in result.items() if not used[where].any()}
 
     def multipliers(self, lam: np.ndarray) -> dict[str, np.ndarray]:
         """Those of conditions of the user, by their texts."""
-        found: dict[str, list[float]] = {}
+        result: dict[str, list[float]] = {}
         for label in self.program.labels:
             if label.soft:
                 for k in range(label.n):
-                    found.setdefault(label.text + label.entries[k % len(label.entries)], []).append(float(lam[label.first + k]))
-        return {text: np.array(values) for text, values in found.items()}
+                    result.setdefault(label.text + label.entries[k % len(label.entries)], []).append(float(lam[label.first + k]))
+        return {text: np.array(values) for text, values in result.items()}
 
     def costates(self, lam: np.ndarray, T: float) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,), s, and the costates there, (n, n_x): a defect d of the state across an interval changes the cost by

@@ -53,15 +53,15 @@ class Expressions:
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
         """(N, m, n)."""
-        found = np.zeros((len(at), *self.slopes.shape))
-        found[:, self.slopes] = self._at(self._first, at)
-        return found
+        result = np.zeros((len(at), *self.slopes.shape))
+        result[:, self.slopes] = self._at(self._first, at)
+        return result
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Second derivatives (N, n, n) of the sums with weights (N, m)."""
-        found = np.zeros((len(at), *self.curvature.shape))
-        found[:, self.curvature] = self._at(self._second, at, weights)
-        return found
+        result = np.zeros((len(at), *self.curvature.shape))
+        result[:, self.curvature] = self._at(self._second, at, weights)
+        return result
 
     def _at(self, tape: Tape, at: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
         values = dict(zip(self.names, at.T, strict=True))

@@ -83,10 +83,10 @@ class Groups:
         self._at = np.array([*range(before + len(of.free)), *((self.n - 1,) if last else ())], dtype=int)
         self.corner = (self._at[:, None], self._at)
 
-    def columns(self, found: np.ndarray) -> np.ndarray:
+    def columns(self, result: np.ndarray) -> np.ndarray:
         """Of derivatives (..., whole) those by the arguments, (..., n)."""
-        made = np.zeros((*found.shape[:-1], self.n), dtype=found.dtype)
-        made[..., self._at] = found[..., self.kept]
+        made = np.zeros((*result.shape[:-1], self.n), dtype=result.dtype)
+        made[..., self._at] = result[..., self.kept]
         return made
 
 
@@ -116,16 +116,16 @@ class Dynamics:
 
     def jacobian(self, t: np.ndarray, at: np.ndarray) -> np.ndarray:
         """(N, n_x, n)."""
-        found = [self._call(name, t, at, (self.of.n_x, self._by.sizes[by])) for by, name in self._first.items()]
-        return self._by.columns(np.concatenate(found, axis=2))
+        result = [self._call(name, t, at, (self.of.n_x, self._by.sizes[by])) for by, name in self._first.items()]
+        return self._by.columns(np.concatenate(result, axis=2))
 
     def hessian(self, t: np.ndarray, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """(N, n, n), of the sums with weights (N, n_x)."""
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), weights])
         whole = self._call(self._second, t, at, (self._by.whole, self._by.whole), given)
-        found = np.zeros((len(at), self.of.n, self.of.n))
-        found[:, *self._by.corner] = whole[:, self._by.kept[:, None], self._by.kept]
-        return found
+        result = np.zeros((len(at), self.of.n, self.of.n))
+        result[:, *self._by.corner] = whole[:, self._by.kept[:, None], self._by.kept]
+        return result
 
     def _call(self, name: str, t: np.ndarray, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
         """A compiled function at all points; NaN at all of them where it cannot be evaluated at one: such a step is not taken."""
@@ -160,9 +160,9 @@ class Field:
 
     def at_shares(self, shares: np.ndarray) -> Field:
         """The same at other points."""
-        found = object.__new__(Field)
-        found.__dict__ = {**self.__dict__, "shares": shares}
-        return found
+        result = object.__new__(Field)
+        result.__dict__ = {**self.__dict__, "shares": shares}
+        return result
 
     def _times(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Durations (N,), times (N,), arguments with the time in place of the duration (N, n)."""
@@ -182,21 +182,21 @@ class Field:
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
         T, t, timed = self._times(at)
-        found = T[:, None, None] * self._slopes(t, timed)
-        found[:, :, -1] = self._values(t, timed) + self.shares[:, None] * found[:, :, -1]
-        return found
+        result = T[:, None, None] * self._slopes(t, timed)
+        result[:, :, -1] = self._values(t, timed) + self.shares[:, None] * result[:, :, -1]
+        return result
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         T, t, timed = self._times(at)
         slopes = np.einsum("ni,nij->nj", weights, self._slopes(t, timed))
-        found = T[:, None, None] * (self.dynamics.hessian(t, timed, weights[:, :-1])
-                                    + self.integrand.hessian(timed, weights[:, -1:]))
-        found[:, -1, :-1] = found[:, :-1, -1] = slopes[:, :-1] + self.shares[:, None] * found[:, :-1, -1]
-        found[:, -1, -1] = self.shares * (2 * slopes[:, -1] + self.shares * found[:, -1, -1])
-        return found
+        result = T[:, None, None] * (self.dynamics.hessian(t, timed, weights[:, :-1])
+                                     + self.integrand.hessian(timed, weights[:, -1:]))
+        result[:, -1, :-1] = result[:, :-1, -1] = slopes[:, :-1] + self.shares[:, None] * result[:, :-1, -1]
+        result[:, -1, -1] = self.shares * (2 * slopes[:, -1] + self.shares * result[:, -1, -1])
+        return result
 
 
 def structure_of(module: Module, name: str, shape: tuple[int, ...]) -> np.ndarray:
     """Where derivatives may differ from zero; everywhere where the module does not know."""
-    found = module.structure(name)
-    return np.ones(shape, dtype=bool) if found is None else found
+    result = module.structure(name)
+    return np.ones(shape, dtype=bool) if result is None else result

@@ -64,12 +64,12 @@ class WithFunctions:
         return self.expression.values(at) + self._of_functions(at)[0][:, None]
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = self.expression.jacobian(at)
-        found[:, 0, self._by] += self._of_functions(at)[1]
-        return found
+        result = self.expression.jacobian(at)
+        result[:, 0, self._by] += self._of_functions(at)[1]
+        return result
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        found, n = self.expression.hessian(at, weights), len(self._by)
+        result, n = self.expression.hessian(at, weights), len(self._by)
         second = np.zeros((len(at), n, n))
         for k, column in enumerate(self._by):
             h = STEP * (1 + np.abs(at[:, column]))
@@ -79,15 +79,15 @@ class WithFunctions:
                 moved[:, column] += way * h
                 sides.append(self._of_functions(moved)[1])
             second[:, k] = (sides[1] - sides[0]) / (2 * h)[:, None]
-        found[:, self._by[:, None], self._by] += weights[:, :, None] * (second + second.transpose(0, 2, 1)) / 2
-        return found
+        result[:, self._by[:, None], self._by] += weights[:, :, None] * (second + second.transpose(0, 2, 1)) / 2
+        return result
 
     def depend_on_time(self, t: Sequence[float], x: np.ndarray) -> bool:
         """Whether values or derivatives at a state (n_x,) are others at other times."""
         rows = np.array(t, dtype=float), np.tile(x, (len(t), 1)), np.zeros((len(t), self.of.n_in))
         for function in self.functions:
-            found = cost_of(self.module, self.what, function, self._names, self.p, compared=False)(*rows)
-            if np.ptp(np.column_stack([found.values, found.by_x]), axis=0).any():
+            result = cost_of(self.module, self.what, function, self._names, self.p, compared=False)(*rows)
+            if np.ptp(np.column_stack([result.values, result.by_x]), axis=0).any():
                 return True
         return False
 
@@ -99,17 +99,17 @@ class WithFunctions:
             for row in at:
                 here = self._one(function, row)
                 for name, column, given in zip(names, self._by, () if here is None else here[1], strict=here is not None):
-                    found = self._differences(function, row, column)
-                    if found is None:
+                    result = self._differences(function, row, column)
+                    if result is None:
                         continue
-                    rounding = 1e3 * np.finfo(float).eps * found.size / found.h
-                    allowed = 10 * found.uncertain + rounding + NEAR * max(abs(given), abs(found.central))
-                    if min(abs(given - d) for d in (found.central, found.before, found.after)) > allowed:
+                    rounding = 1e3 * np.finfo(float).eps * result.size / result.h
+                    allowed = 10 * result.uncertain + rounding + NEAR * max(abs(given), abs(result.central))
+                    if min(abs(given - d) for d in (result.central, result.before, result.after)) > allowed:
                         called = getattr(function, "__name__", "<lambda>")
                         which = "" if called == "<lambda>" else f" ({called})"
                         raise ArgumentError(f"{self.module.name}: the function for {self.what} of the loss{which} gives "
                                             f"{given:.6g} as its derivative by {name} at t = {row[-1]:.6g}, and differences of "
-                                            f"its values give {found.central:.6g}; correct the derivative")
+                                            f"its values give {result.central:.6g}; correct the derivative")
 
     def _differences(self, function: Callable[..., Any], row: np.ndarray, column: int) -> _Differences | None:
         """By one argument; None where the function is not defined to both sides."""
@@ -117,10 +117,10 @@ class WithFunctions:
         for way in (-steps[0], -steps[1], 0.0, steps[1], steps[0]):
             moved = row.copy()
             moved[column] += way
-            found = self._one(function, moved)
-            if found is None:
+            result = self._one(function, moved)
+            if result is None:
                 return None
-            values.append(found[0])
+            values.append(result[0])
         far, h = steps
         central = (values[3] - values[1]) / (2 * h)
         return _Differences(central, (values[2] - values[1]) / h, (values[3] - values[2]) / h,
@@ -132,13 +132,13 @@ class WithFunctions:
         p[list(self.of.free)] = row[self._by[self.of.n_x:]]
         try:
             cost = cost_of(self.module, self.what, function, self._names, p, compared=False)
-            found = cost(row[-1:], row[None, self._x], np.zeros((1, self.of.n_in)))
+            result = cost(row[-1:], row[None, self._x], np.zeros((1, self.of.n_in)))
         except EvaluationError as error:
             if isinstance(error, InputRaised) and not isinstance(error.__cause__, OF_NUMBERS):
                 raise
             self.raised = self.raised or error
             return None
-        return found.values[0], np.concatenate([found.by_x[0], np.zeros(0) if found.by is None else found.by[0]])
+        return result.values[0], np.concatenate([result.by_x[0], np.zeros(0) if result.by is None else result.by[0]])
 
     def _of_functions(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (N,) of all functions and their derivatives (N, n) by the state and free parameters; NaN where they are not
@@ -146,10 +146,10 @@ class WithFunctions:
         value, slopes = np.zeros(len(at)), np.zeros((len(at), len(self._by)))
         for k, row in enumerate(at):
             for function in self.functions:
-                found = self._one(function, row) if np.isfinite(row).all() else None
-                if found is None:
+                result = self._one(function, row) if np.isfinite(row).all() else None
+                if result is None:
                     value[k], slopes[k] = np.nan, np.nan
                     break
-                value[k] += found[0]
-                slopes[k] += found[1]
+                value[k] += result[0]
+                slopes[k] += result[1]
         return value, slopes

@@ -64,12 +64,12 @@ def solve(program: Scaled, z: np.ndarray, accuracy: float, max_iterations: int, 
         raise ArgumentError(f"optimize: IPOPT does not take options {dict(options)}: "
                             f"{str(error).strip().splitlines()[-1]}") from None
     raised: list[Exception] = calls["raised"]
-    found = solver(x0=z, lbx=program.z_least, ubx=program.z_most, lbg=program.g_least, ubg=program.g_most)
+    result = solver(x0=z, lbx=program.z_least, ubx=program.z_most, lbg=program.g_least, ubg=program.g_most)
     if raised:
         raise raised[0]
     stats = solver.stats()
-    return Found(np.array(found["x"]).ravel(), float(found["f"]), np.array(found["lam_g"]).ravel(),
-                 np.array(found["lam_x"]).ravel(), int(stats["iter_count"]), stats["return_status"] in SOLVED,
+    return Found(np.array(result["x"]).ravel(), float(result["f"]), np.array(result["lam_g"]).ravel(),
+                 np.array(result["lam_x"]).ravel(), int(stats["iter_count"]), stats["return_status"] in SOLVED,
                  stats["return_status"].replace("_", " "))
 
 

@@ -55,8 +55,8 @@ def _jumps(recorder: Recorder, value: Node, jump: Jump, leaves: Mapping[str, Nod
     points = np.random.default_rng(0).normal(size=(POINTS, len(names))) * np.repeat([1.0, 30.0], POINTS // 2)[:, None]
 
     def surface(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        found = evaluate_rows(on, dict(zip(names, y.T, strict=True)), len(y))
-        return found["s"].reshape(len(y)), found["slopes"].reshape(len(y), -1)
+        result = evaluate_rows(on, dict(zip(names, y.T, strict=True)), len(y))
+        return result["s"].reshape(len(y)), result["slopes"].reshape(len(y), -1)
 
     with np.errstate(all="ignore"):
         for _ in range(STEPS):

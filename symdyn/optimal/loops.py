@@ -44,18 +44,18 @@ class Loops:
         return np.hstack([self._call(name, at, (self.n_c,)) for name in ("C", "C_dot")])[:, self.rows]
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, size)) for by, size in self._by.sizes.items()],
-                                axis=2) for name in ("C", "C_dot")]
-        return self._by.columns(np.concatenate(found, axis=1)[:, self.rows])
+        result = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, size)) for by, size in self._by.sizes.items()],
+                                 axis=2) for name in ("C", "C_dot")]
+        return self._by.columns(np.concatenate(result, axis=1)[:, self.rows])
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         whole = np.zeros((len(at), 2 * self.n_c))
         whole[:, self.rows] = weights
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), whole])
         second = self._call(f"constraints_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
-        found = np.zeros((len(at), self._by.n, self._by.n))
-        found[:, *self._by.corner] = second[:, self._by.kept[:, None], self._by.kept]
-        return found
+        result = np.zeros((len(at), self._by.n, self._by.n))
+        result[:, *self._by.corner] = second[:, self._by.kept[:, None], self._by.kept]
+        return result
 
     def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
         n_x = self.of.n_x
@@ -88,10 +88,10 @@ class UnitLengths:
         return np.where(self.slopes, 2 * at[:, None, :], 0.0)
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        found = np.zeros((len(at), *self.curvature.shape))
+        result = np.zeros((len(at), *self.curvature.shape))
         for k, group in enumerate(self.groups):
-            found[:, group, group] = 2 * weights[:, k, None]
-        return found
+            result[:, group, group] = 2 * weights[:, k, None]
+        return result
 
 
 def unit_groups(module: Module) -> list[list[int]]:
@@ -127,7 +127,7 @@ def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, 
         moved = on_constraints(module, some, np.column_stack([np.interp(some, t, x) for x in X.T]), p, leading)
         return np.column_stack([np.interp(t, some, x) for x in moved.T])
     metadata, sizes = module.metadata, module.metadata.sizes
-    found, q = X.copy(), X[0, :sizes.q]
+    result, q = X.copy(), X[0, :sizes.q]
     led = np.array([name in leading for name in metadata.q], dtype=bool)
     for k in range(len(X)):
         guess = np.where(led, X[k, :sizes.q], q)
@@ -137,27 +137,27 @@ def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, 
                 break
             except SymdynError:
                 continue
-        found[k, :sizes.q] = q
-    rates = np.gradient(found[:, :sizes.q], t, axis=0)
-    N, C_r, C_t = (module.evaluate(name, t, found, p) for name in ("N", "C_r", "C_t"))
+        result[k, :sizes.q] = q
+    rates = np.gradient(result[:, :sizes.q], t, axis=0)
+    N, C_r, C_t = (module.evaluate(name, t, result, p) for name in ("N", "C_r", "C_t"))
     for k in range(len(X)):
         rows, right = np.vstack([N[k], C_r[k]]), np.concatenate([rates[k], -C_t[k]])
-        found[k, sizes.q:sizes.q + sizes.u] = np.linalg.lstsq(rows, right, rcond=None)[0]
-    return found
+        result[k, sizes.q:sizes.q + sizes.u] = np.linalg.lstsq(rows, right, rcond=None)[0]
+    return result
 
 
 def normals(module: Module, t: np.ndarray, x: np.ndarray, p: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Directions (N, n_x, n) along which the state is corrected: orthonormal ones for the rows, of positions and of velocities,
     then those of what has unit length."""
     sizes, n_c, groups = module.metadata.sizes, len(module.metadata.constraints), unit_groups(module)
-    found = np.zeros((len(x), sizes.x, len(rows) + len(groups)))
+    result = np.zeros((len(x), sizes.x, len(rows) + len(groups)))
     for j, group in enumerate(groups):
-        found[:, group, len(rows) + j] = x[:, group] / np.linalg.norm(x[:, group], axis=1)[:, None]
+        result[:, group, len(rows) + j] = x[:, group] / np.linalg.norm(x[:, group], axis=1)[:, None]
     if not len(rows):
-        return found
+        return result
     C_r, N = module.evaluate("C_r", t, x, p), module.evaluate("N", t, x, p)
     of_positions, of_speeds = rows[rows < n_c], rows[rows >= n_c] - n_c
     for k in range(len(x)):
-        found[k, :sizes.q, :len(of_positions)] = np.linalg.qr(N[k] @ C_r[k, of_positions].T)[0]
-        found[k, sizes.q:sizes.q + sizes.u, len(of_positions):len(rows)] = np.linalg.qr(C_r[k, of_speeds].T)[0]
-    return found
+        result[k, :sizes.q, :len(of_positions)] = np.linalg.qr(N[k] @ C_r[k, of_positions].T)[0]
+        result[k, sizes.q:sizes.q + sizes.u, len(of_positions):len(rows)] = np.linalg.qr(C_r[k, of_speeds].T)[0]
+    return result

@@ -216,9 +216,9 @@ def _breaks(intervals: Any, faults: Faults) -> np.ndarray:
             return np.linspace(0.0, 1.0, int(intervals) + 1)
     else:
         try:
-            found = real(intervals)
-            if found.ndim == 1 and len(found) > 1 and found[0] == 0 and found[-1] == 1 and (np.diff(found) > 0).all():
-                return found
+            result = real(intervals)
+            if result.ndim == 1 and len(result) > 1 and result[0] == 0 and result[-1] == 1 and (np.diff(result) > 0).all():
+                return result
         except NotReal:
             pass
     faults.add(f"intervals is {shown(intervals)}; pass a whole number from 1 to {MOST_INTERVALS}, or increasing numbers from 0 "
@@ -293,8 +293,8 @@ def _middle(bounds: np.ndarray, left_out: np.ndarray) -> np.ndarray:
     """Of bounds (2, n): their middle, the finite one, or what stands for none."""
     low, high = bounds
     both = np.isfinite(low) & np.isfinite(high)
-    found = np.where(both, (np.where(both, low, 0) + np.where(both, high, 0)) / 2, left_out)
-    return np.asarray(np.clip(found, low, high))
+    result = np.where(both, (np.where(both, low, 0) + np.where(both, high, 0)) / 2, left_out)
+    return np.asarray(np.clip(result, low, high))
 
 
 def _of_motion(given: Any, free: Sequence[str], faults: Faults) -> dict[str, Any]:
@@ -311,20 +311,20 @@ def _of_motion(given: Any, free: Sequence[str], faults: Faults) -> dict[str, Any
 
 def _row(value: Any, name: str, faults: Faults) -> np.ndarray | None:
     try:
-        found = real(value)
+        result = real(value)
     except NotReal as error:
         faults.add(f"{name} of the guess must be numbers, found {shown(value)}: {error}")
         return None
-    if found.ndim > 1:
-        faults.add(f"{name} of the guess must be numbers in a row, found the shape {found.shape}")
+    if result.ndim > 1:
+        faults.add(f"{name} of the guess must be numbers in a row, found the shape {result.shape}")
         return None
-    wrong = np.flatnonzero(~np.isfinite(found))
+    wrong = np.flatnonzero(~np.isfinite(result))
     if len(wrong):
-        of = f", of {found.size} values {len(wrong)} are not" if len(wrong) > 1 else ""
-        at = f" at its index {wrong[0]}" if found.ndim else ""
-        faults.add(f"{name} of the guess must be finite, and is {found.ravel()[wrong[0]]}{at}{of}")
+        of = f", of {result.size} values {len(wrong)} are not" if len(wrong) > 1 else ""
+        at = f" at its index {wrong[0]}" if result.ndim else ""
+        faults.add(f"{name} of the guess must be finite, and is {result.ravel()[wrong[0]]}{at}{of}")
         return None
-    return found
+    return result
 
 
 @dataclass(frozen=True)
@@ -407,17 +407,17 @@ class _Search:
         if optimum.simulated is None or not optimum.simulated.success:
             why = "" if optimum.simulated is None else f": {optimum.simulated.message}"
             return f"the motion could not be simulated back by its inputs{why}"
-        gaps, found = np.array(list(optimum.difference.values())), []
+        gaps, result = np.array(list(optimum.difference.values())), []
         parts = gaps / np.array(list(optimum.sizes.values()))
         if len(parts) and not parts.max() <= most:
             k = int(parts.argmax())
-            found.append(f"simulated back by its inputs, {optimum.module.metadata.x[k]} differs by {gaps[k]:.3g} from the motion "
-                         "found")
+            result.append(f"simulated back by its inputs, {optimum.module.metadata.x[k]} differs by {gaps[k]:.3g} from the "
+                          "motion found")
         away, least = abs(optimum.cost_difference), 2 * self.chosen.accuracy * solved.made.scaled.cost_size
         if not away <= max(most * max(abs(optimum.cost), abs(optimum.integrated_cost)), least):
-            found.append(f"the cost is {optimum.cost:.6g} by the quadrature of the mesh, and {optimum.integrated_cost:.6g} "
-                         "integrated along the motion")
-        return "; ".join(found) + (f" (allowed is {most:.2g} of the size of a state, or of the cost)" if found else "")
+            result.append(f"the cost is {optimum.cost:.6g} by the quadrature of the mesh, and {optimum.integrated_cost:.6g} "
+                          "integrated along the motion")
+        return "; ".join(result) + (f" (allowed is {most:.2g} of the size of a state, or of the cost)" if result else "")
 
     def _finer(self, optimum: Optimum) -> str:
         """What to do about a motion that is not exact enough."""
@@ -430,16 +430,16 @@ class _Search:
         held = _on_states(self.problem) if self.chosen.kind == "hermite-simpson" else []
         return f"; or leave transcription out: inputs of Hermite and Simpson go to and fro under {held[0]}" if held else ""
 
-    def _measured(self, made: Discretized, found: Found, before: _Solved | None) -> _Solved:
+    def _measured(self, made: Discretized, result: Found, before: _Solved | None) -> _Solved:
         """With the errors of the intervals."""
         of_states = of_cost = np.full(made.mesh.n_intervals, np.nan)
         along = np.nan
-        if np.isfinite(found.z).all():
-            of_states = made.errors(found.z)
-            along, of_cost = made.cost_along(found.z, self.chosen.accuracy)
-        record = MeshRecord(made.mesh.n_intervals, made.steps, found.iterations, found.cost,
+        if np.isfinite(result.z).all():
+            of_states = made.errors(result.z)
+            along, of_cost = made.cost_along(result.z, self.chosen.accuracy)
+        record = MeshRecord(made.mesh.n_intervals, made.steps, result.iterations, result.cost,
                             float(np.maximum(of_states, of_cost).max()), self._lap())
-        return _Solved(made, found, of_states, of_cost, along, (*(before.records if before is not None else ()), record))
+        return _Solved(made, result, of_states, of_cost, along, (*(before.records if before is not None else ()), record))
 
     def _lap(self) -> float:
         now = clock.perf_counter()
@@ -465,31 +465,31 @@ class _Search:
             made = Discretized(self.problem, mesh, steps, guess, sizes=sizes)
             self._demand_finite(made)
             self._demand_derivatives(made, made.z)
-            found = self._kept(made, self._solve(made))
-            if not np.isfinite(found.z).all():
+            result = self._kept(made, self._solve(made))
+            if not np.isfinite(result.z).all():
                 break
             assert made.sizes is not None
-            now = made.found_sizes(found.z)
-            turned = found.solved and bool(made.normals.size) and (
-                made.transversal(made.motion(found.z)) <= TRANSVERSAL)
-            if not turned and not (found.solved and now.grown(made.sizes, GROWN)):
+            now = made.found_sizes(result.z)
+            turned = result.solved and bool(made.normals.size) and (
+                made.transversal(made.motion(result.z)) <= TRANSVERSAL)
+            if not turned and not (result.solved and now.grown(made.sizes, GROWN)):
                 break
-            guess, sizes = made.motion(found.z), now
-        return made, found
+            guess, sizes = made.motion(result.z), now
+        return made, result
 
-    def _kept(self, made: Discretized, found: Found) -> Found:
+    def _kept(self, made: Discretized, result: Found) -> Found:
         """With the guesses of what nothing depends on, which solvers move away from bounds."""
         self.undetermined: tuple[str, ...] = ()
-        if not found.solved or not np.isfinite(found.z).all():
-            return found
-        names, z, least = made.undetermined(found.z), found.z.copy(), made.violations(found.z)
+        if not result.solved or not np.isfinite(result.z).all():
+            return result
+        names, z, least = made.undetermined(result.z), result.z.copy(), made.violations(result.z)
         for where in names.values():
             z[where] = made.z[where]
-        same = abs(made.program.f(z) - found.cost) <= UNCHANGED * (made.scaled.cost_size + abs(found.cost))
+        same = abs(made.program.f(z) - result.cost) <= UNCHANGED * (made.scaled.cost_size + abs(result.cost))
         if not names or not same or not (made.violations(z) <= least + UNCHANGED).all():
-            return found
+            return result
         self.undetermined = tuple(names)
-        return replace(found, z=z)
+        return replace(result, z=z)
 
     def _demand_derivatives(self, made: Discretized, z: np.ndarray) -> None:
         """Raises ArgumentError where derivatives that functions of the cost give are not those of their values: at the start, in
@@ -510,12 +510,12 @@ class _Search:
         chosen = self.chosen
         scaled, begin = made.scaled, made.z / made.scaled.z_sizes
         if chosen.method == "ipopt":
-            found = ipopt.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.options, chosen.verbose)
+            result = ipopt.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.options, chosen.verbose)
         else:
-            found = scipy_solvers.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.method)
-        return replace(found, z=found.z * scaled.z_sizes, cost=found.cost * scaled.cost_size,
-                       multipliers=found.multipliers * scaled.cost_size / scaled.g_sizes,
-                       of_bounds=found.of_bounds * scaled.cost_size / scaled.z_sizes)
+            result = scipy_solvers.solve(scaled, begin, chosen.accuracy, chosen.max_iterations, chosen.method)
+        return replace(result, z=result.z * scaled.z_sizes, cost=result.cost * scaled.cost_size,
+                       multipliers=result.multipliers * scaled.cost_size / scaled.g_sizes,
+                       of_bounds=result.of_bounds * scaled.cost_size / scaled.z_sizes)
 
     def _demand_finite(self, made: Discretized) -> None:
         """Raises EvaluationError where cost or constraints are not finite at the guess."""
@@ -550,22 +550,22 @@ class _Search:
 
     def _optimum(self, solved: _Solved) -> Optimum:
         """The result, with the motion by its inputs; where that cannot be computed, what differs stays not a number."""
-        problem, made, found = self.problem, solved.made, solved.found
-        mesh, motion = made.mesh, made.motion(found.z)
+        problem, made, result = self.problem, solved.made, solved.found
+        mesh, motion = made.mesh, made.motion(result.z)
         x, u = made.polynomials(motion)
         in_time = lambda poly: PPoly(poly.c / motion.T ** np.arange(len(poly.c) - 1, -1, -1.0)[:, None, None],
                                      problem.t0 + poly.x * motion.T)
         x, u = in_time(x), in_time(u)
         t = problem.t0 + mesh.nodes * motion.T
         metadata = problem.module.metadata
-        sizes = dict(zip(metadata.x, made.found_sizes(found.z).x.tolist(), strict=True))
+        sizes = dict(zip(metadata.x, made.found_sizes(result.z).x.tolist(), strict=True))
         optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
                           {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)},
-                          self.undetermined, found.cost, solved.along, np.nan, motion.T,
+                          self.undetermined, result.cost, solved.along, np.nan, motion.T,
                           sum(r.iterations for r in solved.records), solved.records, float(solved.errors.max()), solved.errors,
                           dict.fromkeys(metadata.x, np.nan), None,
-                          made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
-                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, sizes, x, u)
+                          made.multipliers(result.multipliers), *made.costates(result.multipliers, motion.T), self._kind(mesh),
+                          result.solved, result.message, 0.0, problem.t0 + mesh.breaks * motion.T, sizes, x, u)
         simulated, difference, cost = None, optimum.difference, np.nan
         if np.isfinite(optimum.x).all():
             with contextlib.suppress(SymdynError), warnings.catch_warnings():
@@ -574,7 +574,7 @@ class _Search:
                 if simulated.success:
                     gaps = np.abs(simulated.x - optimum.x).max(axis=0).tolist()
                     difference = dict(zip(difference, gaps, strict=True))
-                    cost = made.cost_of(found.z, simulated)
+                    cost = made.cost_of(result.z, simulated)
         return replace(optimum, simulated=simulated, difference=difference, simulated_cost=cost,
                        seconds=clock.perf_counter() - self.begun)
 
@@ -585,44 +585,44 @@ class _Search:
 
     def _failed(self, solved: _Solved, before: _Solved | None) -> NoOptimum:
         """What to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
-        owner, made, found = self.problem.module.name, solved.made, solved.found
+        owner, made, result = self.problem.module.name, solved.made, solved.found
         optimum = self._optimum(before or solved)
         n = sum(record.iterations for record in solved.records)
-        head = f"{owner}: no optimal motion was found in {n} iterations ({found.message})"
+        head = f"{owner}: no optimal motion was found in {n} iterations ({result.message})"
         if before is not None:
             head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {before.made.mesh.n_intervals} is kept"
-        fallen = self._fallen(made, found)
+        fallen = self._fallen(made, result)
         if fallen:
             return NoOptimum(f"{head}; {fallen}", optimum)
-        if found.iterations >= self.chosen.max_iterations:
-            return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess"
+        if result.iterations >= self.chosen.max_iterations:
+            return NoOptimum(f"{head}; {self._worst(made, result.z)}; allow more iterations, or begin with a better guess"
                              f"{self._radau_instead()}{self._kinked()}", optimum)
         head += self._kinked()
         try:
-            begin = made.motion(found.z) if np.isfinite(found.z).all() else made.guess
+            begin = made.motion(result.z) if np.isfinite(result.z).all() else made.guess
             elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True, sizes=made.sizes)
             nearest = self._solve(elastic)
         except (SymdynError, RuntimeError):
-            return NoOptimum(f"{head}; {self._worst(made, found.z)}", optimum)
+            return NoOptimum(f"{head}; {self._worst(made, result.z)}", optimum)
         s = nearest.z[elastic.layout.n:].reshape(2, -1)
         missed = np.abs(s[0] - s[1])
         if not nearest.solved:
-            return NoOptimum(f"{head}; {self._worst(made, found.z)}; begin with another guess{self._radau_instead()}", optimum)
+            return NoOptimum(f"{head}; {self._worst(made, result.z)}; begin with another guess{self._radau_instead()}", optimum)
         parts = missed / elastic.g_sizes[elastic.slacks]
         if parts.max(initial=0.0) <= MISSED:
             return NoOptimum(f"{head}; a motion that fulfils all conditions exists, so begin with another guess: "
-                             f"{self._worst(made, found.z)}{self._radau_instead()}", optimum)
+                             f"{self._worst(made, result.z)}{self._radau_instead()}", optimum)
         texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
                 for k in np.argsort(-parts)[:4] if parts[k] > MISSED]
         return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",
                          optimum)
 
-    def _fallen(self, made: Discretized, found: Found) -> str:
+    def _fallen(self, made: Discretized, result: Found) -> str:
         """What to say of a cost that goes to minus infinity; nothing where it does not."""
         begin = made.program.f(made.z)
-        if found.cost > begin - FALLEN * (made.scaled.cost_size + abs(begin)) or np.isnan(found.cost):
+        if result.cost > begin - FALLEN * (made.scaled.cost_size + abs(begin)) or np.isnan(result.cost):
             return ""
-        problem, motion = self.problem, made.motion(found.z)
+        problem, motion = self.problem, made.motion(result.z)
         inputs, states = problem.module.metadata.inputs, problem.module.metadata.x
         rows = [(n, motion.U[:, k], problem.inputs[:, k]) for k, n in enumerate(inputs)]
         rows += [(n, motion.p[[k]], bounds) for n, k, bounds in zip(problem.free, problem.of.free, problem.params.T, strict=True)]
@@ -630,7 +630,7 @@ class _Search:
         if not open_ones:
             open_ones = [(n, motion.X[:, k]) for k, n in enumerate(states) if not np.isfinite(problem.states[:, k]).all()]
         reached = ", ".join(f"{n} (up to {np.abs(values).max():.3g})" for n, values in open_ones)
-        return (f"the cost goes to minus infinity: it is {found.cost:.3g} at the last point"
+        return (f"the cost goes to minus infinity: it is {result.cost:.3g} at the last point"
                 + (f", and these have no bounds: {reached}; give them bounds, or a cost that grows with them" if reached else ""))
 
     def _kinked(self) -> str:

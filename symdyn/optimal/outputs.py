@@ -44,29 +44,29 @@ class WithOutputs:
         return self.expressions.values(self._whole(at))
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = self.expressions.jacobian(self._whole(at))
-        return found[:, :, :self.n] + found[:, :, self.n:] @ self._slopes(at)
+        result = self.expressions.jacobian(self._whole(at))
+        return result[:, :, :self.n] + result[:, :, self.n:] @ self._slopes(at)
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         whole, Y = self._whole(at), self._slopes(at)
         H = self.expressions.hessian(whole, weights)
         on_outputs = np.einsum("ni,nij->nj", weights, self.expressions.jacobian(whole)[:, :, self.n:])
         cross = H[:, :self.n, self.n:] @ Y
-        found = H[:, :self.n, :self.n] + cross + cross.transpose(0, 2, 1) + Y.transpose(0, 2, 1) @ H[:, self.n:, self.n:] @ Y
+        result = H[:, :self.n, :self.n] + cross + cross.transpose(0, 2, 1) + Y.transpose(0, 2, 1) @ H[:, self.n:, self.n:] @ Y
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), on_outputs])
         second = self._call(f"outputs_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
-        found[:, self._at, self._at][:, *self._by.corner] += second[:, self._by.kept[:, None], self._by.kept]
-        return np.asarray(found)
+        result[:, self._at, self._at][:, *self._by.corner] += second[:, self._by.kept[:, None], self._by.kept]
+        return np.asarray(result)
 
     def _whole(self, at: np.ndarray) -> np.ndarray:
         return np.hstack([at, self._call("outputs", at, (self.n_y,))])
 
     def _slopes(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the outputs by the arguments, (N, n_y, n); by the time where it is not prescribed."""
-        found = np.zeros((len(at), self.n_y, self.n))
+        result = np.zeros((len(at), self.n_y, self.n))
         parts = [self._call(f"outputs_by_{by}", at, (self.n_y, size)) for by, size in self._by.sizes.items()]
-        found[:, :, self._at] = self._by.columns(np.concatenate(parts, axis=2))
-        return found
+        result[:, :, self._at] = self._by.columns(np.concatenate(parts, axis=2))
+        return result
 
     def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
         n_x, n_in, free = self.of.n_x, self.of.n_in, list(self.of.free)
@@ -75,7 +75,7 @@ class WithOutputs:
             self.p = self.p.copy()
             self.p[free] = mine[0, n_x + n_in:n_x + n_in + len(free)]
         try:
-            found = self.module.evaluate(name, mine[:, -1], mine[:, :n_x], self.p, mine[:, n_x:n_x + n_in], given)
+            result = self.module.evaluate(name, mine[:, -1], mine[:, :n_x], self.p, mine[:, n_x:n_x + n_in], given)
         except EvaluationError:
             return np.full((len(at), *shape), np.nan)
-        return np.asarray(found).reshape(len(at), *shape)
+        return np.asarray(result).reshape(len(at), *shape)

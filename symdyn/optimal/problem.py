@@ -169,8 +169,8 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
 
 
 def _kinks(expressions: Sequence[Any]) -> tuple[str, ...]:
-    found = {str(part) for e in expressions if isinstance(e, sp.Basic) for part in e.atoms(*KINKED)}
-    return tuple(sorted(found))
+    result = {str(part) for e in expressions if isinstance(e, sp.Basic) for part in e.atoms(*KINKED)}
+    return tuple(sorted(result))
 
 
 def _free_parameters(metadata: Any, given: Any, faults: Faults) -> dict[str, tuple[float, float]]:
@@ -179,8 +179,8 @@ def _free_parameters(metadata: Any, given: Any, faults: Faults) -> dict[str, tup
     if not isinstance(given, Mapping):
         faults.add(f"parameters is {shown(given)}; pass a mapping from names to bounds (least, most)")
         return {}
-    found = _pairs(given, metadata.parameters, "parameters", faults)
-    return {n: found[n] for n in metadata.parameters if n in found}
+    result = _pairs(given, metadata.parameters, "parameters", faults)
+    return {n: result[n] for n in metadata.parameters if n in result}
 
 
 def _values_of_parameters(module: Module, params: Any, free: Mapping[str, tuple[float, float]]) -> np.ndarray:
@@ -197,25 +197,25 @@ def _values_of_parameters(module: Module, params: Any, free: Mapping[str, tuple[
 
 def _number(value: Any, faults: Faults, what: str) -> float:
     try:
-        found = number(value)
+        result = number(value)
     except NotReal:
-        found = np.nan
-    if not np.isfinite(found):
+        result = np.nan
+    if not np.isfinite(result):
         faults.add(f"{what} is {shown(value)}; pass a finite number")
         return 0.0
-    return found
+    return result
 
 
 def _duration(given: Any, faults: Faults) -> np.ndarray:
     pair = given if isinstance(given, (list, tuple)) else (given, given)
     try:
-        found = np.array([number(v) for v in pair])
+        result = np.array([number(v) for v in pair])
     except NotReal:
-        found = np.zeros(0)
-    if found.shape != (2,) or not np.isfinite(found).all() or not 0 < found[0] <= found[1]:
+        result = np.zeros(0)
+    if result.shape != (2,) or not np.isfinite(result).all() or not 0 < result[0] <= result[1]:
         faults.add(f"duration is {shown(given)}; pass a positive number of seconds, or (least, most) for one that is free")
         return np.ones(2)
-    return found
+    return result
 
 
 def _pairs(given: Any, there: Sequence[str], what: str, faults: Faults, single: bool = False) -> dict[str, tuple[float, float]]:
@@ -225,7 +225,7 @@ def _pairs(given: Any, there: Sequence[str], what: str, faults: Faults, single: 
     if not isinstance(given, Mapping):
         faults.add(f"{what} is {shown(given)}; pass a mapping from names or symbols")
         return {}
-    found = {}
+    result = {}
     for key, value in given.items():
         name = faults.name(key, there, what)
         pair = FREE if value is None and not single else value if isinstance(value, (list, tuple)) else (value, value)
@@ -240,13 +240,13 @@ def _pairs(given: Any, there: Sequence[str], what: str, faults: Faults, single: 
         elif numbers[0] > numbers[1] or np.inf == numbers[0] or -np.inf == numbers[1]:
             faults.add(f"{what} of {name} contradict each other: at least {numbers[0]:g} and at most {numbers[1]:g}")
         else:
-            found[name] = (numbers[0], numbers[1])
-    return found
+            result[name] = (numbers[0], numbers[1])
+    return result
 
 
 def _ends(metadata: Any, start: Any, end: Any, states: np.ndarray, faults: Faults) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the state at the start and at the end, (2, n_x) each."""
-    found = []
+    result = []
     for what, given in (("start", start), ("end", end)):
         left_out = {n: (metadata.initial.get(n, 0.0),) * 2 if what == "start" else FREE for n in metadata.x}
         if isinstance(given, str) and given == "free":
@@ -263,8 +263,8 @@ def _ends(metadata: Any, start: Any, end: Any, states: np.ndarray, faults: Fault
             if low > most or high < least:
                 faults.add(f"the {what} of {name}, {low:g}" + (f" to {high:g}" if high > low else "") + f", is outside of its "
                            f"bounds ({least:g}, {most:g})")
-        found.append(np.array([np.maximum(both[0], states[0]), np.minimum(both[1], states[1])]))
-    return found[0], found[1]
+        result.append(np.array([np.maximum(both[0], states[0]), np.minimum(both[1], states[1])]))
+    return result[0], result[1]
 
 
 @dataclass(frozen=True)
@@ -288,19 +288,19 @@ class _Read:
         if given is None:
             return sp.S.Zero
         try:
-            found = sp.sympify(given, strict=True)
-            if not isinstance(found, sp.Expr):
+            result = sp.sympify(given, strict=True)
+            if not isinstance(result, sp.Expr):
                 raise TypeError
         except (sp.SympifyError, TypeError):
             self.faults.add(f"{what} is {shown(given)}; pass an expression of coordinates, speeds, inputs, parameters, outputs "
                             "and sd.t")
             return sp.S.Zero
         there = (*self.names, *self.constants, *output_names(self.module))
-        unknown = sorted({str(s) for s in found.free_symbols} - set(there))
+        unknown = sorted({str(s) for s in result.free_symbols} - set(there))
         if unknown:
             self.faults.add(f"{what} has {', '.join(unknown)}, which is not there; there are {', '.join(there)}")
             return sp.S.Zero
-        return found
+        return result
 
     def cost(self, given: Sequence[Any], what: str) -> Expressions | WithOutputs | WithFunctions | None:
         """Costs, added up; None, and a fault, for what has no derivatives."""
@@ -322,9 +322,9 @@ class _Read:
             self.faults.add(f"{what}: {error}")
             return None
         for expression, text in zip(given, each, strict=True):
-            found = jumping(expression, names, self.constants, self.fixed)
+            result = jumping(expression, names, self.constants, self.fixed)
             self.jumps.extend(f"{text} jumps by {jump['what']} where {jump['surface']} passes zero (write {jump['remedy']})"
-                              for jump in found)
+                              for jump in result)
         return WithOutputs(made, self.module, self.of, self.p, self.first, self.timed) if used else made
 
 
@@ -356,9 +356,9 @@ def _timed(module: Module, p: np.ndarray) -> frozenset[str]:
 
 def _depends_on_time(module: Module, name: str, p: np.ndarray) -> bool:
     """Whether a function depends on the time, by structure, or where this is not known by its values at two times."""
-    found = module.structure(f"{name}_by_t")
-    if found is not None:
-        return bool(found.any())
+    result = module.structure(f"{name}_by_t")
+    if result is not None:
+        return bool(result.any())
     x = np.array([module.metadata.initial.get(n, 0.0) for n in module.metadata.x]) + 0.1
     first, second = (module.evaluate(name, t, x, p) for t in (0.1, 0.7351))
     return not np.array_equal(first, second)

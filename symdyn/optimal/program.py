@@ -35,9 +35,9 @@ class Block:
     def at(self, z: np.ndarray) -> np.ndarray:
         """The arguments (N, n)."""
         there = self.columns >= 0
-        found = self.constants.copy()
-        found[there] += self.scale[there] * z[self.columns[there]]
-        return found
+        result = self.constants.copy()
+        result[there] += self.scale[there] * z[self.columns[there]]
+        return result
 
 
 @dataclass(frozen=True)
@@ -79,27 +79,27 @@ class Program:
 
     def f(self, z: np.ndarray) -> float:
         """The cost."""
-        found = 0.0
+        result = 0.0
         for block, F in zip(self.blocks, self._all("values", z), strict=True):
             there = np.flatnonzero(block.b)
-            found += float(block.b[there] @ F.ravel()[there])
-        return found
+            result += float(block.b[there] @ F.ravel()[there])
+        return result
 
     def g(self, z: np.ndarray) -> np.ndarray:
         """The constraints (m,)."""
-        found: np.ndarray = self.L @ z
+        result: np.ndarray = self.L @ z
         for block, F in zip(self.blocks, self._all("values", z), strict=True):
             if block.A.nnz:
-                found = found + block.A @ F.ravel()
-        return found
+                result = result + block.A @ F.ravel()
+        return result
 
     def gradient(self, z: np.ndarray) -> np.ndarray:
         """Of the cost (n,)."""
-        found = np.zeros(self.n)
+        result = np.zeros(self.n)
         for (at, columns, factors), J in zip(self._of_cost, self._all("jacobian", z), strict=True):
             if len(at):
-                found += np.bincount(columns, factors * J.ravel()[at], self.n)
-        return found
+                result += np.bincount(columns, factors * J.ravel()[at], self.n)
+        return result
 
     def jacobian(self, z: np.ndarray) -> np.ndarray:
         """Of the constraints, the entries of the pattern (rows, colptr)."""

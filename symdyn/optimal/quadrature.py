@@ -31,7 +31,7 @@ def integrals(f: Callable[[np.ndarray], np.ndarray], breaks: np.ndarray, relativ
     of = np.repeat(np.arange(K), CUTS)
     h = np.repeat(np.diff(breaks) / CUTS, CUTS)
     begin = breaks[of] + h * np.tile(np.arange(CUTS), K)
-    found, size, coarse = np.zeros(K), np.zeros(K), over(begin, h)[0]
+    result, size, coarse = np.zeros(K), np.zeros(K), over(begin, h)[0]
     for halved in range(HALVED):
         halves = np.stack([begin, begin + h / 2], axis=1)
         fine, absolute = (part.reshape(-1, 2) for part in over(halves.ravel(), np.repeat(h / 2, 2)))
@@ -40,9 +40,9 @@ def integrals(f: Callable[[np.ndarray], np.ndarray], breaks: np.ndarray, relativ
         least = relative * (np.nansum(size) + np.nansum(of_both))
         with np.errstate(invalid="ignore"):
             still = (np.abs(both - coarse) > least) & (halved < HALVED - 1)  # not a number: closed
-        found += np.bincount(of[~still], both[~still], K)
+        result += np.bincount(of[~still], both[~still], K)
         size += np.bincount(of[~still], of_both[~still], K)
         if not still.any():
             break
         of, h, begin, coarse = np.repeat(of[still], 2), np.repeat(h[still] / 2, 2), halves[still].ravel(), fine[still].ravel()
-    return found, size
+    return result, size

@@ -39,30 +39,30 @@ def solve(program: Scaled, z: np.ndarray, accuracy: float, max_iterations: int, 
                         "fun": lambda y, r=rows, b=bound, s=sign: s * (program.g(whole(y))[r] - b[r]),
                         "jac": lambda y, r=rows, s=sign: s * jacobian(y)[r].toarray()}
                        for k, (rows, bound, sign) in enumerate(sides) if rows.any()]
-        found = minimize(lambda y: program.f(whole(y)), z[free], jac=gradient, bounds=bounds, constraints=constraints,
-                         method="SLSQP", options={"maxiter": max_iterations, "ftol": accuracy})
+        result = minimize(lambda y: program.f(whole(y)), z[free], jac=gradient, bounds=bounds, constraints=constraints,
+                          method="SLSQP", options={"maxiter": max_iterations, "ftol": accuracy})
     else:
         constraints = [NonlinearConstraint(lambda y: program.g(whole(y)), program.g_least, program.g_most, jac=jacobian,
                                            hess=lambda y, v: hessian(y, 0.0, v))] if program.m else []
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of dense factorizations, and of quasi-Newton updates that are not made
-            found = minimize(lambda y: program.f(whole(y)), z[free], jac=gradient,
-                             hess=lambda y: hessian(y, 1.0, np.zeros(program.m)), bounds=bounds, constraints=constraints,
-                             method="trust-constr", options={"maxiter": max_iterations, "gtol": accuracy, "xtol": accuracy**1.5})
-    at = whole(found.x)
+            result = minimize(lambda y: program.f(whole(y)), z[free], jac=gradient,
+                              hess=lambda y: hessian(y, 1.0, np.zeros(program.m)), bounds=bounds, constraints=constraints,
+                              method="trust-constr", options={"maxiter": max_iterations, "gtol": accuracy, "xtol": accuracy**1.5})
+    at = whole(result.x)
     missing = program.violations(at)
     size = 1 + np.minimum(np.abs(program.g_least), np.abs(program.g_most))
     fulfilled = bool(np.all(missing <= FULFILLED * size))
-    ended = found.success if method == "slsqp" else found.status in (1, 2)
+    ended = result.success if method == "slsqp" else result.status in (1, 2)
     multipliers, of_bounds = np.full(program.m, np.nan), np.full(program.n, np.nan)
     if method == "trust-constr" and program.m:
-        multipliers = np.asarray(found.v[0])
-        of_bounds[free] = found.v[1] if len(found.v) > 1 else np.zeros(n_free)
-    message = str(found.message) if fulfilled else f"{found.message}; constraints are not fulfilled"
-    return Found(at, float(found.fun), multipliers, of_bounds, int(found.nit), bool(ended) and fulfilled, message)
+        multipliers = np.asarray(result.v[0])
+        of_bounds[free] = result.v[1] if len(result.v) > 1 else np.zeros(n_free)
+    message = str(result.message) if fulfilled else f"{result.message}; constraints are not fulfilled"
+    return Found(at, float(result.fun), multipliers, of_bounds, int(result.nit), bool(ended) and fulfilled, message)
 
 
 def _filled(z: np.ndarray, free: np.ndarray, y: np.ndarray) -> np.ndarray:
-    found = z.copy()
-    found[free] = y
-    return found
+    result = z.copy()
+    result[free] = y
+    return result

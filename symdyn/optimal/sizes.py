@@ -72,10 +72,10 @@ def found_sizes(of: Arguments, at: np.ndarray, before: Sizes) -> Sizes:
 
 def _first(*sizes: np.ndarray) -> np.ndarray:
     """The first of some sizes that is not zero, entry by entry."""
-    found = sizes[0].copy()
+    result = sizes[0].copy()
     for other in sizes[1:]:
-        found = np.where(found > 0, found, other)
-    return found
+        result = np.where(result > 0, result, other)
+    return result
 
 
 def _needed(slopes: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -72,7 +72,7 @@ class Steps:
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         x, cost = at[:, self.of.x].copy(), np.zeros(len(at))
         steps = list(self._through(at, x, cost, self._unit(at)))
-        n_x, found = self.of.n_x, np.zeros((len(at), self.size, self.size))
+        n_x, result = self.of.n_x, np.zeros((len(at), self.size, self.size))
         on_x, on_cost = weights[:, :-1].copy(), weights[:, -1:]
         h = (self.h / self.n)[:, None]
         for stages in reversed(steps):
@@ -81,11 +81,11 @@ class Steps:
             for i in reversed(range(len(C))):
                 field, y, G, _ = stages[i]
                 w = np.hstack([h * (B[i] * on_x + (A[i + 1] * carried if i + 1 < len(C) else 0.0)), h * B[i] * on_cost])
-                found += np.einsum("kai,kab,kbj->kij", G, field.hessian(y, w), G, optimize=True)
+                result += np.einsum("kai,kab,kbj->kij", G, field.hessian(y, w), G, optimize=True)
                 carried = np.einsum("ka,kai->ki", w, field.jacobian(y)[:, :, :n_x])
                 total += carried
             on_x = total
-        return found
+        return result
 
     def _through(self, at: np.ndarray, x: np.ndarray, cost: np.ndarray, D: np.ndarray | None) -> Iterator[list[Stage]]:
         """Goes through the steps and changes x (K, n_x), the cost (K,) and their derivatives D (K, n_x + 1, n)."""

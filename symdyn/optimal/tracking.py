@@ -64,8 +64,8 @@ class Tracking:
         try:
             if not self._begin <= t <= self._end:
                 t = float(motion.within(t))
-            found: np.ndarray = motion.inputs_over_time(t)
-            found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - motion.states_over_time(t))
+            result: np.ndarray = motion.inputs_over_time(t)
+            result[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - motion.states_over_time(t))
         except (TypeError, ValueError):  # checked afterwards: it is called at every step of a motion
             number_of(t, motion.module.name, "t of a regulator must be a number")
             state = real_of(x, motion.module.name, "x of a regulator must be numbers")
@@ -73,7 +73,7 @@ class Tracking:
                 raise ArgumentError(f"{motion.module.name}: x of a regulator has the shape {state.shape}; needed is "
                                     f"{(len(self.Q),)}") from None
             raise
-        return found
+        return result
 
     @cached_property
     def _driven_indices(self) -> list[int]:
@@ -99,8 +99,8 @@ class Tracking:
         array([5., 6., 7., 8.])
         """
         n = len(self.Q)
-        found = np.asarray(self._S(float(self.motion.within(t)))).reshape(n, n)
-        return np.asarray((found + found.T) / 2)
+        result = np.asarray(self._S(float(self.motion.within(t)))).reshape(n, n)
+        return np.asarray((result + result.T) / 2)
 
     def K(self, t: float) -> np.ndarray:
         """The gain at a time, (k, n_x), rows as driven, columns as the state; by polynomials through exact values. Raises
@@ -145,23 +145,23 @@ def tracking(motion: Optimum | Course, Q: Any, R: Any, Qf: Any = None) -> Tracki
         S = flat.reshape(n, n)
         if not np.isfinite(flat).all() or not np.isfinite(t):
             raise EvaluationError(without)
-        found = module.jacobian(t, motion.at(t), motion.params, motion.inputs_at(t), wrt=["x", "inputs"])
-        assert found.x is not None and found.inputs is not None
-        A, SB = found.x, S @ found.inputs[:, indices]
+        result = module.jacobian(t, motion.at(t), motion.params, motion.inputs_at(t), wrt=["x", "inputs"])
+        assert result.x is not None and result.inputs is not None
+        A, SB = result.x, S @ result.inputs[:, indices]
         return np.asarray(-(A.T @ S + S @ A - SB @ inverse @ SB.T + of_states)).ravel()
 
     first, last = float(motion.t[0]), float(motion.t[-1])
     size = max(np.abs(of_states).max(), np.abs(at_end).max(), 1e-300)
     with np.errstate(all="ignore"):
-        found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
-    if not found.success:
+        result = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
+    if not result.success:
         raise EvaluationError(without)
-    return Tracking(motion, of_states, of_inputs, at_end, driven, found.sol, _gain(motion, found, indices, inverse))
+    return Tracking(motion, of_states, of_inputs, at_end, driven, result.sol, _gain(motion, result, indices, inverse))
 
 
-def _gain(motion: Optimum | Course, found: Any, indices: Sequence[int], inverse: np.ndarray) -> PPoly:
+def _gain(motion: Optimum | Course, result: Any, indices: Sequence[int], inverse: np.ndarray) -> PPoly:
     """R^-1 B^T S as polynomials through its values in every interval of the mesh and step of Riccati's equation."""
-    breaks = np.unique(np.concatenate([motion.breaks, found.t[(found.t > motion.t[0]) & (found.t < motion.t[-1])]]))
+    breaks = np.unique(np.concatenate([motion.breaks, result.t[(result.t > motion.t[0]) & (result.t < motion.t[-1])]]))
     apart = np.append(np.diff(breaks) > CLOSE * (breaks[-1] - breaks[0]), True)
     apart[0] = True
     breaks, h = breaks[apart], np.diff(breaks[apart])
@@ -170,7 +170,7 @@ def _gain(motion: Optimum | Course, found: Any, indices: Sequence[int], inverse:
     B = motion.module.jacobian(t, motion.at(t), motion.params, motion.inputs_at(t), wrt=["inputs"]).inputs
     assert B is not None
     n = motion.module.metadata.sizes.x
-    S = np.asarray(found.sol(t)).T.reshape(-1, n, n)
+    S = np.asarray(result.sol(t)).T.reshape(-1, n, n)
     K = np.einsum("ij,tkj,tkl->til", inverse, B[:, :, indices], (S + S.transpose(0, 2, 1)) / 2)
     c = through(inner, K.reshape(len(h), POINTS, -1), h)
     return PPoly(c.reshape(*c.shape[:2], len(indices), n), breaks)

@@ -184,11 +184,11 @@ def radau_points(d: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _basis(points: np.ndarray) -> list[Polynomial]:
     """The polynomials of Lagrange through points."""
-    found = []
+    result = []
     for j, one in enumerate(points):
         others = np.delete(points, j)
-        found.append(Polynomial(np.atleast_1d(np.poly(others))[::-1]) / np.prod(one - others))
-    return found
+        result.append(Polynomial(np.atleast_1d(np.poly(others))[::-1]) / np.prod(one - others))
+    return result
 
 
 def _differences(points: np.ndarray) -> np.ndarray:
@@ -204,8 +204,8 @@ def _values(points: np.ndarray, at: float) -> np.ndarray:
 def through(points: np.ndarray, values: np.ndarray, h: np.ndarray) -> np.ndarray:
     """Coefficients as PPoly has them, (d, K, n), of polynomials through values (K, d, n) at points of each interval."""
     basis = np.array([np.pad(p.coef, (0, len(points) - len(p.coef))) for p in _basis(points)])  # (d, powers)
-    found = np.einsum("kjn,jp->pkn", values, basis) / h[None, :, None] ** np.arange(len(points))[:, None, None]
-    return np.ascontiguousarray(found[::-1])
+    result = np.einsum("kjn,jp->pkn", values, basis) / h[None, :, None] ** np.arange(len(points))[:, None, None]
+    return np.ascontiguousarray(result[::-1])
 
 
 def _thirds(K: int) -> np.ndarray:

@@ -83,7 +83,7 @@ def _closer(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> tuple[np.n
     worst = [_highest(list(curves.values())[-1], 1.0)] if curves else []
     worst += [_highest(-d, -NEAR_LOCK) for d in distances(tested.module, x).T]
     times, states = [t], [x]
-    for k in sorted({k for found in worst for k in found}):
+    for k in sorted({k for result in worst for k in result}):
         low, high = max(k - 1, 0), min(k + 1, len(t) - 1)
         if high <= low:
             continue
@@ -140,14 +140,14 @@ def _weakest(tested: SystemUnderTest, t: float, x: np.ndarray) -> list[str]:
 
 def _locks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> list[Passage]:
     """For the Euler angles of every joint where they come nearest to gimbal lock, and where else they come near."""
-    found = []
+    result = []
     for (joint, sequence, *_), d in zip(tested.module.metadata.charts, distances(tested.module, x).T, strict=True):
         for k in _highest(-d, -NEAR_LOCK):
             near = bool(d[k] < NEAR_LOCK)
             advice = f": {INSTEAD}" if near else ""
-            found.append(Passage(float(t[k]), f"the {sequence} angles of joint {joint} come within "
-                                 f"{math.asin(min(1.0, d[k])):.2g} rad of gimbal lock{advice}", near))
-    return found
+            result.append(Passage(float(t[k]), f"the {sequence} angles of joint {joint} come within "
+                                  f"{math.asin(min(1.0, d[k])):.2g} rad of gimbal lock{advice}", near))
+    return result
 
 
 def _condition(matrix: np.ndarray) -> float:
@@ -165,15 +165,16 @@ def _scaled(matrix: np.ndarray) -> np.ndarray:
     return np.asarray(matrix / size[:, None] / size[None, :])
 
 
-def picture(found: Along) -> str:
+def picture(result: Along) -> str:
     """The curves with the places, as the address of an <img>. Raises MissingExtra without matplotlib."""
     from symdyn.overview.pictures import figure, source
 
     drawing = figure((11.0, 3.6))
     axes: Any = drawing.add_subplot(111)
-    for (label, values), style in zip(found.curves.items(), ((1.0, "#9a9a9a"), (1.8, "#0072B2"), (1.8, "#D55E00")), strict=False):
-        axes.semilogy(found.t, np.where(np.isfinite(values), values, np.nan), label=label, linewidth=style[0], color=style[1])
-    for t, label, near in _labels(found):
+    styles = (1.0, "#9a9a9a"), (1.8, "#0072B2"), (1.8, "#D55E00")
+    for (label, values), style in zip(result.curves.items(), styles, strict=False):
+        axes.semilogy(result.t, np.where(np.isfinite(values), values, np.nan), label=label, linewidth=style[0], color=style[1])
+    for t, label, near in _labels(result):
         axes.axvline(t, color="#b00020" if near else "#777777", linewidth=0.9, linestyle=":")
         axes.annotate(label, (t, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 2), textcoords="offset points",
                       ha="center", va="bottom", fontsize=8, color="#b00020" if near else "#555555")
@@ -188,11 +189,11 @@ def picture(found: Along) -> str:
     return source(drawing)
 
 
-def _labels(found: Along) -> list[tuple[float, str, bool]]:
+def _labels(result: Along) -> list[tuple[float, str, bool]]:
     """Times with the numbers of the places there, those that lie close together as one."""
     labels: list[tuple[float, str, bool]] = []
-    for k, passage in enumerate(found.passages, 1):
-        if labels and passage.t - labels[-1][0] <= 0.02 * (found.t[-1] - found.t[0]):
+    for k, passage in enumerate(result.passages, 1):
+        if labels and passage.t - labels[-1][0] <= 0.02 * (result.t[-1] - result.t[0]):
             t, label, near = labels[-1]
             labels[-1] = t, f"{label}, {k}", near or passage.near
         else:

@@ -115,7 +115,7 @@ def typesetter() -> Callable[[str], str]:
     from markupsafe import Markup, escape
 
     def convert(latex: str) -> str:
-        latex = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.12g}", latex)
+        latex = _LONG_NUMBER.sub(lambda result: f"{float(result[0]):.12g}", latex)
         try:
             return Markup(mathml(latex))
         except Exception:  # not installed, or it does not know the command

@@ -177,14 +177,14 @@ def _show_generated(part: Part, equations: Equations) -> None:
 
 
 def _show_condition(part: Part, tested: SystemUnderTest) -> None:
-    found = full_condition.along(tested)
-    if len(found.solution.t) and stands_still(tested, found.solution.x):
+    result = full_condition.along(tested)
+    if len(result.solution.t) and stands_still(tested, result.solution.x):
         part.notes.append(STILL)
-    part.shown = {"found": found, "curves": [_range(label, values) for label, values in found.curves.items()],
-                  "states": len(found.t), "end": f"{found.solution.t[-1]:g}" if len(found.solution.t) else "0",
-                  "facts": facts(found.solution),
-                  "picture": _noted(part, lambda: full_condition.picture(found), "") if found.curves else "",
-                  "mechanism": _noted(part, lambda: full_pictures.mechanism(found.solution), [])}
+    part.shown = {"found": result, "curves": [_range(label, values) for label, values in result.curves.items()],
+                  "states": len(result.t), "end": f"{result.solution.t[-1]:g}" if len(result.solution.t) else "0",
+                  "facts": facts(result.solution),
+                  "picture": _noted(part, lambda: full_condition.picture(result), "") if result.curves else "",
+                  "mechanism": _noted(part, lambda: full_pictures.mechanism(result.solution), [])}
 
 
 def _range(label: str, values: Any) -> dict[str, str]:

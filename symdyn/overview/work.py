@@ -35,10 +35,10 @@ def measure(tested: Any, formulation: str, budget: float, log: Callable[[str], N
     """
     begun = clock.perf_counter()
 
-    def left(found: Benchmark | None) -> float:
+    def left(result: Benchmark | None) -> float:
         """Seconds; none where the reference is not kept and takes too much of them again."""
         rest = budget - (clock.perf_counter() - begun)
-        return 0.0 if found is not None and found.reference.kind == "agreement" and rest < _AGAIN * budget else max(rest, 0.0)
+        return 0.0 if result is not None and result.reference.kind == "agreement" and rest < _AGAIN * budget else max(rest, 0.0)
 
     def run(formulations: Sequence[str] | None, methods: Sequence[str], seconds: float) -> Benchmark:
         from symdyn.bench.work import bench

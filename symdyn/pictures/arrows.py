@@ -90,20 +90,20 @@ def arrows_of(solution: Solution, length: float, forces: bool = False) -> list[A
     forces   with forces in joints and of loads and weights, all forces to one scale, and torques in joints and of loads, all to
              another; what is zero all the time, or rounding, is left out
     """
-    found = [*_contacts(solution, length)]
+    result = [*_contacts(solution, length)]
     if forces:
         others = [one for kind in (_joints, _loads, _weights) for one in kind(solution)]
-        common = max([*[one.largest for one in others if not one.turns], *[usual(one.vectors) for one in found]], default=0.0)
-        found = [replace(one, scale=LARGEST * length / common) for one in found]
+        common = max([*[one.largest for one in others if not one.turns], *[usual(one.vectors) for one in result]], default=0.0)
+        result = [replace(one, scale=LARGEST * length / common) for one in result]
         turning = max((one.largest for one in others if one.turns), default=0.0)
-        strongest = max([common, *[one.largest for one in found]])
+        strongest = max([common, *[one.largest for one in result]])
         for one in others:
             least = _ROUNDING * (max(turning, strongest * length) if one.turns else strongest)
             sizes = np.nan_to_num(np.linalg.norm(one.vectors, axis=2)).max(axis=0, initial=0.0)
             acting = one.only(np.flatnonzero(sizes > least).tolist())
             if acting.names:
-                found.append(replace(acting, scale=LARGEST * length / (turning if acting.turns else common)))
-    return [replace(one, head=FULL * length) for one in found]
+                result.append(replace(acting, scale=LARGEST * length / (turning if acting.turns else common)))
+    return [replace(one, head=FULL * length) for one in result]
 
 
 def _contacts(solution: Solution, length: float) -> Iterator[Arrows]:

@@ -40,8 +40,8 @@ class Bending:
 
         def nearest(values: np.ndarray) -> np.ndarray:
             columns = values[order].reshape(len(order), -1).T
-            found = np.column_stack([np.interp(stations[:, axis], along, column) for column in columns])
-            return found.reshape(len(stations), *values.shape[1:])
+            result = np.column_stack([np.interp(stations[:, axis], along, column) for column in columns])
+            return result.reshape(len(stations), *values.shape[1:])
 
         return replace(self, points=stations, shapes=nearest(self.shapes), second=nearest(self.second))
 
@@ -69,9 +69,9 @@ def bendings(solution: Solution) -> dict[int, Bending]:
 def bent_bodies(records: Sequence[Mapping[str, Any]], bodies: Sequence[str],
                 values: Callable[[str], np.ndarray]) -> dict[int, Bending]:
     """Flexible bodies by their index among bodies; values: of an elastic coordinate over time, (n_t,)."""
-    found = {}
+    result = {}
     for record in records:
         eta = np.column_stack([values(name) for name in record["coordinates"]])
         points, shapes, second = (np.array(record[name], dtype=float) for name in ("stations", "shapes", "second"))
-        found[list(bodies).index(record["body"])] = Bending(points, shapes, second, eta, tuple(record["coordinates"]))
-    return found
+        result[list(bodies).index(record["body"])] = Bending(points, shapes, second, eta, tuple(record["coordinates"]))
+    return result

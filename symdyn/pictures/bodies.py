@@ -195,13 +195,13 @@ def _sticks(axes: Any, drawing: Drawing, sticks: Skeleton, alpha: float) -> list
 def _arrows(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
     """Curves for arrows, and points where contacts act."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
-    found = []
+    result = []
     for one in drawing.arrows:
         color = one.arrows.color
-        found.append(axes.plot(*empty, color=color, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0])
+        result.append(axes.plot(*empty, color=color, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0])
         if one.arrows.layer == "contacts":
-            found.append(axes.plot(*empty, color=color, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0])
-    return found
+            result.append(axes.plot(*empty, color=color, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0])
+    return result
 
 
 def explain(figure: Any, drawing: Drawing) -> None:
@@ -231,14 +231,14 @@ def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
 
 
 def _points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
-    found, sticks = [], drawing.sticks
+    result, sticks = [], drawing.sticks
     if sticks is not None:
         slides = [sticks.lines[k][:, places] for k, places in sticks.sliders.items()]
-        found += [points[index] for points in (sticks.rails, sticks.arms, *sticks.lines, *slides,
-                                               drawing.centres[:, drawing.bare])]
+        result += [points[index] for points in (sticks.rails, sticks.arms, *sticks.lines, *slides,
+                                                drawing.centres[:, drawing.bare])]
     for one in drawing.arrows:
-        found += [one.curve(index), *([one.tails[index]] if one.arrows.layer == "contacts" else [])]
-    return found
+        result += [one.curve(index), *([one.tails[index]] if one.arrows.layer == "contacts" else [])]
+    return result
 
 
 def move(artist: Any, points: np.ndarray) -> None:

@@ -31,19 +31,19 @@ def mechanism(solution: Solution, times: Sequence[tuple[str, float]]) -> list[di
     drawing = Drawing.of(solution) if len(solution.t) else None
     if drawing is None:
         return []
-    found = []
+    result = []
     there = drawing.at(solution.t, np.array([t for _, t in times])) if len(solution.t) > 1 else drawing
     for k, (title, t) in enumerate(times):
         figure = _square(drawing)
         show(make_artists(make_axes(figure, 111, drawing), there), there, k)
-        found.append({"source": _source(figure, tight=True), "title": title, "text": f"t = {t:.5g} s"})
+        result.append({"source": _source(figure, tight=True), "title": title, "text": f"t = {t:.5g} s"})
     if len(solution.t) > 1:
         figure = _square(drawing)
         draw_path(figure, 111, drawing)
         text = figure.axes[0].get_title()
         figure.axes[0].set_title("")
-        found.append({"source": _source(figure, tight=True), "title": "motion", "text": text})
-    return found
+        result.append({"source": _source(figure, tight=True), "title": "motion", "text": text})
+    return result
 
 
 def curves(solution: Solution) -> list[dict[str, str]]:

@@ -142,14 +142,14 @@ def _forms(item: Item) -> list[Form]:
         return [Form(line(body, color, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), _THREAD), item)]
     if item.kind in ("rope", "mooring"):
         return [Form(line(body, color, np.zeros((POINTS, 3)), _THREAD), item)]
-    found = []
+    result = []
     if item.kind in ("spring", "both"):
-        found.append(Form(_coil(body, color), item, radii=(size[0], size[0])))
+        result.append(Form(_coil(body, color), item, radii=(size[0], size[0])))
     if item.kind in ("damper", "both"):
         r = size[0] * (_SLIM if item.kind == "both" else 1.0)
-        found += [Form(rod, item, ends, (share * r, share * r)) for ends, share in
-                  (((0.0, 0.55), _CYLINDER), ((0.55, 1.0), _PISTON))]
-    return found
+        result += [Form(rod, item, ends, (share * r, share * r)) for ends, share in
+                   (((0.0, 0.55), _CYLINDER), ((0.55, 1.0), _PISTON))]
+    return result
 
 
 def _rod(body: int, color: tuple[float, float, float], around: int) -> Part:

@@ -73,15 +73,15 @@ class Reach:
 
     def places(self, names: Iterable[str], body: int) -> np.ndarray:
         """Centres of mass and origins of bodies in the axes of another, or of the ground: body -1; (n, 3)."""
-        found = []
+        result = []
         for k in (self.bodies.index(name) for name in names):
             o, R = self.frames[:, k, :3], self.frames[:, k, 3:].reshape(-1, 3, 3)
-            found += [o, o + R @ self.centres[k]]
-        places = np.concatenate(found)
+            result += [o, o + R @ self.centres[k]]
+        places = np.concatenate(result)
         if body < 0:
             return places
         o, R = self.frames[:, body, :3], self.frames[:, body, 3:].reshape(-1, 3, 3)
-        return np.concatenate([np.einsum("tji,tj->ti", R, one - o) for one in found])
+        return np.concatenate([np.einsum("tji,tj->ti", R, one - o) for one in result])
 
     @property
     def margin(self) -> float:

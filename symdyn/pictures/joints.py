@@ -19,9 +19,9 @@ def find_joints(poses: Sequence[tuple], ground: tuple, size: float) -> Iterator[
         chosen = None
         for k in waiting:
             for j in placed[compared[k]:]:
-                found = _joint(ground if j == GROUND else poses[j], poses[k], size)
-                if found is not None:
-                    ways[k].insert(0, (j, *found))
+                result = _joint(ground if j == GROUND else poses[j], poses[k], size)
+                if result is not None:
+                    ways[k].insert(0, (j, *result))
             compared[k] = len(placed)
             # A motion can hide who carries whom; the shortest connection is then as true as any.
             best = min(ways[k], key=lambda way: (way[2], way[3]), default=None)

@@ -113,12 +113,12 @@ class Mechanism:
     @property
     def carriers(self) -> frozenset[int]:
         """Bodies without mass that only slide and carry what slides: a way to write down how something moves freely."""
-        found = set()
+        result = set()
         for body, inertia in enumerate(self.inertia if self.inertia is not None else ()):
             kinds = [kind for _, *ends, kind in self.joints if body in map(self.index, ends)]
             if len(kinds) > 1 and all(kind in _SLIDING for kind in kinds) and not inertia.any():
-                found.add(body)
-        return frozenset(found)
+                result.add(body)
+        return frozenset(result)
 
     @property
     def up(self) -> tuple[float, float, float]:
@@ -166,7 +166,7 @@ class Mechanism:
         return m, np.where(np.abs(about) > 1e-12 * max(c @ c, 1e-300), about, 0.0)
 
 
-def drawn_otherwise(about: Any, joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> frozenset[int]:
+def not_drawn_by_rules(about: Any, joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> frozenset[int]:
     """Indices of bodies that rules draw nothing for: those with shapes of the user's, those that bend, massless carriers. A line
     that goes on to another body is no shape of its first.
 
@@ -257,8 +257,8 @@ def length_of(m: Mechanism) -> float:
         extents.append(float(np.linalg.norm(np.ptp(own, axis=0))) * (1.0 if len(m.bodies) == 1 else 1.5))
         extents.append(2.5 * float(np.sqrt(max(np.trace(m.moments(body)[1]), 0.0))))
     extent = max(extents)
-    found = max(apart, extent, _WAY * m.way if extent <= _SAME * m.way else 0.0)
-    return found if np.isfinite(found) and found > 0 else 1.0
+    result = max(apart, extent, _WAY * m.way if extent <= _SAME * m.way else 0.0)
+    return result if np.isfinite(result) and result > 0 else 1.0
 
 
 def ropes_of(names: Sequence[str], connections: Sequence[tuple[str, str, str, str]], gaps: Sequence[float],
@@ -381,7 +381,7 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
 def _attached(m: Mechanism, body: int, length: float) -> list[tuple[Ref, np.ndarray, int]]:
     """Points of a body that hold something: what refers to them, where they are in its axes, their joint or -1. The joint that
     carries the body comes first."""
-    found: list[tuple[Ref, np.ndarray, int]] = []
+    result: list[tuple[Ref, np.ndarray, int]] = []
     springs = 2 * len(m.joints) + 2 * len(m.bodies)
     ends = [(j, side) for side in (1, 0) for j, (_, *names, kind) in enumerate(m.joints)
             if m.index(names[side]) == body and kind not in _FLOATING]
@@ -391,9 +391,9 @@ def _attached(m: Mechanism, body: int, length: float) -> list[tuple[Ref, np.ndar
     every = [(ref, m.local(body, m.points[ref]), j) for ref, j in candidates] + [
         ((body, *tip), tip, -1) for owner, tip in (*m.tips, *m.corners) if owner == body]
     for ref, point, j in every:
-        if all(np.linalg.norm(point - other) > _SAME * length for _, other, _ in found):
-            found.append((ref, point, j))
-    return found
+        if all(np.linalg.norm(point - other) > _SAME * length for _, other, _ in result):
+            result.append((ref, point, j))
+    return result
 
 
 def _rods(m: Mechanism, held: Sequence[tuple[Ref, np.ndarray, int]], r: float, color: str, name: str) -> Iterator[Item]:

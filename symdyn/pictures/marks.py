@@ -25,8 +25,8 @@ def events_of(solution: Solution) -> list[Mark]:
     too many to be seen."""
     about = solution.module.metadata
     touching = {event.name for event, own in zip(about.events, of_contacts(about), strict=True) if own}
-    found = sorted(Mark(float(t), name) for name, rows in solution.events.items() if name not in touching for t in rows.t)
-    return found if len(found) <= MOST_MARKS else []
+    result = sorted(Mark(float(t), name) for name, rows in solution.events.items() if name not in touching for t in rows.t)
+    return result if len(result) <= MOST_MARKS else []
 
 
 def switches_of(solution: Solution) -> list[Mark]:
@@ -34,6 +34,6 @@ def switches_of(solution: Solution) -> list[Mark]:
     if not len(solution.t):
         return []
     begin = float(solution.t[0])
-    found = sorted(Mark(float(t), f"{name}: {mode}") for name, one in solution.contacts.items()
-                   for t, mode in (*one.switches, *((t, "impact") for t in one.impacts.t)) if t != begin)
-    return found if len({mark.t for mark in found}) <= MOST_MARKS else []
+    result = sorted(Mark(float(t), f"{name}: {mode}") for name, one in solution.contacts.items()
+                    for t, mode in (*one.switches, *((t, "impact") for t in one.impacts.t)) if t != begin)
+    return result if len({mark.t for mark in result}) <= MOST_MARKS else []

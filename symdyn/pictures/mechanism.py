@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.pictures.arrows import POINTS
-from symdyn.pictures.looks import GROUND, Mechanism, Ref, drawn_otherwise, point_of, ropes_of, with_surroundings
+from symdyn.pictures.looks import GROUND, Mechanism, Ref, not_drawn_by_rules, point_of, ropes_of, with_surroundings
 from symdyn.pictures.points import points_of
 
 if TYPE_CHECKING:
@@ -74,14 +74,14 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int, span: tuple
     def at(name: str, columns: int) -> np.ndarray:
         if name not in module.functions:
             return np.zeros((0, columns))
-        found = module.evaluate(name, solution.t[first], solution.x[first], solution.params, solution.inputs[first])
-        return np.asarray(found, dtype=float).reshape(-1, columns)
+        result = module.evaluate(name, solution.t[first], solution.x[first], solution.params, solution.inputs[first])
+        return np.asarray(result, dtype=float).reshape(-1, columns)
 
     points = at("joint_points", 6) if "joint_axes" in module.functions else at("", 6)
     springs = at("spring_points", 6)
     names = list(zip(about.reactions, about.reaction_bodies, about.reaction_kinds, strict=True)) if len(points) else []
     inertia = at("inertial_parameters", 10)
-    drawn = drawn_otherwise(about, about.reactions, about.reaction_bodies)
+    drawn = not_drawn_by_rules(about, about.reactions, about.reaction_bodies)
     start = frames[first]
     tips = []
     for output, point in points_of(solution).items():
@@ -90,19 +90,19 @@ def mechanism_of(solution: Solution, frames: np.ndarray, first: int, span: tuple
             R, o = start[point.body, 3:].reshape(3, 3), start[point.body, :3]
             tips.append((point.body, R.T @ (given - o)))
     centres = at("positions", 3) if "positions" in module.functions else start[:, :3]
-    found = Mechanism(about.bodies, start, centres, [(n, *ends, kind) for n, ends, kind in names], points,
-                      at("joint_axes", 3) if len(points) else at("", 3), about.connections if len(springs) else (), springs,
-                      inertia if len(inertia) == len(start) else None, about.planar, about.down, drawn, tips)
-    corners, wheels = _touching(solution, found, frames)
+    result = Mechanism(about.bodies, start, centres, [(n, *ends, kind) for n, ends, kind in names], points,
+                       at("joint_axes", 3) if len(points) else at("", 3), about.connections if len(springs) else (), springs,
+                       inertia if len(inertia) == len(start) else None, about.planar, about.down, drawn, tips)
+    corners, wheels = _touching(solution, result, frames)
     gaps = at("contact_gaps", 1).ravel()[:4 * len(about.contacts):4].tolist()
-    ropes = ropes_of([c.name for c in about.contacts], found.connections, gaps, springs) if len(gaps) else {}
+    ropes = ropes_of([c.name for c in about.contacts], result.connections, gaps, springs) if len(gaps) else {}
     if span is not None:
         within = (solution.t >= span[0]) & (solution.t <= span[1])
         frames = frames[within] if within.sum() > 1 else frames
     way = float(np.linalg.norm(np.ptp(frames[..., :3], axis=(0, 1))))
-    found = replace(found, ropes=ropes, travels=_travels(found, frames), corners=corners, wheels=wheels, way=way)
+    result = replace(result, ropes=ropes, travels=_travels(result, frames), corners=corners, wheels=wheels, way=way)
     around = list(filled([*about.drawn, *about.surroundings], lengths_of(solution)))[len(about.drawn):]
-    return with_surroundings(found, around, about.drawn, frames[np.unique(np.linspace(0, len(frames) - 1, _ROWS).astype(int))])
+    return with_surroundings(result, around, about.drawn, frames[np.unique(np.linspace(0, len(frames) - 1, _ROWS).astype(int))])
 
 
 def lengths_of(solution: Solution) -> np.ndarray:
@@ -163,9 +163,9 @@ def _travels(m: Mechanism, frames: np.ndarray) -> Sequence[tuple[float, float]]:
     still = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel()]), (len(frames), 1, 12))
     frames = np.concatenate([frames, still], axis=1)
     rotations = frames[..., 3:].reshape(*frames.shape[:2], 3, 3)
-    found = []
+    result = []
     for j in range(len(m.joints)):
         a, b = (frames[:, hung.owners[p], :3] + rotations[:, hung.owners[p]] @ hung.places[p] for p in (2 * j, 2 * j + 1))
         way = np.einsum("ti,ti->t", b - a, rotations[:, hung.parents[j]] @ hung.axes[j])
-        found.append((float(way.min()), float(way.max())))
-    return found
+        result.append((float(way.min()), float(way.max())))
+    return result

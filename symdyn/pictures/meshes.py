@@ -153,9 +153,9 @@ def sheet(body: int, color: Color, grid: np.ndarray, every: int) -> Part:
     columns = [at[[i, i + 1], k] for k in {*range(0, m, every), m - 1} for i in range(n - 1)]
     lines = np.array([*rows, *columns])
     lines = lines[finite[lines].all(axis=1)]
-    place = np.cumsum(finite) - 1
-    edges = np.column_stack([place[lines], np.full((len(lines), 2), -1)])
-    return replace(_boxed(body, color, vertices[finite], tuple(place[faces]), edges, True), open=True)
+    index = np.cumsum(finite) - 1
+    edges = np.column_stack([index[lines], np.full((len(lines), 2), -1)])
+    return replace(_boxed(body, color, vertices[finite], tuple(index[faces]), edges, True), open=True)
 
 
 def prism(body: int, color: Color, outline: np.ndarray, half: float) -> Part:
@@ -224,7 +224,7 @@ def _part(body: int, color: Color, vertices: np.ndarray, faces: Sequence[Sequenc
     crease   whether an edge of a face is drawn from every side; rims: edges of one face alone that are drawn nevertheless
     """
     used = sorted({v for face in faces for v in face})
-    place = {v: k for k, v in enumerate(used)}
+    index = {v: k for k, v in enumerate(used)}
     owners: dict[tuple[int, int], list[int]] = {}
     for k, face in enumerate(faces):
         for a, b in zip(face, [*face[1:], face[0]], strict=True):
@@ -233,11 +233,11 @@ def _part(body: int, color: Color, vertices: np.ndarray, faces: Sequence[Sequenc
     edges, creases = [], []
     for ends, both in owners.items():
         if len(both) == 2 or ends in seen:
-            edges.append([*(place[v] for v in ends), *(both if len(both) == 2 else [*both, -1])])
+            edges.append([*(index[v] for v in ends), *(both if len(both) == 2 else [*both, -1])])
             creases.append(any(map(crease, both)))
     own = vertices[used]
     return Part(body, color, own, own if stations is None else stations[used],
-                tuple(np.array([place[v] for v in face]) for face in faces), _corners(faces, place), _corners(hidden, place),
+                tuple(np.array([index[v] for v in face]) for face in faces), _corners(faces, index), _corners(hidden, index),
                 np.array(edges), np.array(creases))
 
 

@@ -54,9 +54,9 @@ def panels_of(solution: Solution, show: Sequence[str] | None = None) -> list[Pan
     return [part for panel in chosen for part in _parts(solution, panel)]
 
 
-def need_something(solution: Solution, show: Sequence[str] | None, found: object) -> None:
+def need_something(solution: Solution, show: Sequence[str] | None, result: object) -> None:
     """Raises ArgumentError where nothing is found of what is to be shown."""
-    if show is not None and not found:
+    if show is not None and not result:
         raise ArgumentError(f"{solution.module.name}: nothing of show = {list(show)!r} is in this motion")
 
 
@@ -70,12 +70,12 @@ def _chosen(solution: Solution, panels: Sequence[Panel], show: Sequence[str]) ->
     if wrong:
         raise ArgumentError(f"{name}: show names {', '.join(map(repr, wrong))}, which are no curves of this motion; there are "
                             f"{', '.join(sorted(there - set(GROUPS)))}, the groups {', '.join(GROUPS)}, and 'mechanism'")
-    found = []
+    result = []
     for panel in panels:
         places = [k for k, key in enumerate(panel.keys) if key in wanted or panel.group in wanted]
         if places:
-            found.append(take(panel, places))
-    return found
+            result.append(take(panel, places))
+    return result
 
 
 def _name(entry: Any) -> Any:

@@ -48,8 +48,8 @@ def points_of(solution: Solution) -> dict[str, BodyPoint]:
         samples = _sample(solution)
     except EvaluationError:  # at a state that the motion did not come to
         return {}
-    found = {name: _match(samples, *samples.outputs[name]) for name in names}
-    return {name: point for name, point in found.items() if point is not None}
+    result = {name: _match(samples, *samples.outputs[name]) for name in names}
+    return {name: point for name, point in result.items() if point is not None}
 
 
 def _sample(solution: Solution) -> _Samples:

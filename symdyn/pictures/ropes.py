@@ -60,11 +60,11 @@ def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float
     """
     way = fairlead - anchor
     x, z = math.hypot(way[0], way[1], 2 * length * NEAREST) / length, float(way[2]) / length
-    found = symdyn_line_force(math, int(seabed), (x, z, give, friction), TINY, CLOSE)
+    result = symdyn_line_force(math, int(seabed), (x, z, give, friction), TINY, CLOSE)
     share = min(1.0, shown / length)
-    if found is None:
+    if result is None:
         return np.asarray(fairlead - np.linspace(0.0, share, POINTS)[:, None] * way)
-    h, v = found
+    h, v = result
     lies, b = (max(1 - v, 0.0), max(v - 1, 0.0)) if seabed else (0.0, v - 1)
     tense = min(lies, h / friction) if friction else lies
 

@@ -142,14 +142,14 @@ class Solids:
 
     def vertices(self, index: int) -> list[np.ndarray]:
         """The vertices of every part at one of the times, (n, 3) each, n-frame."""
-        found = []
+        result = []
         for part, bending in zip(self.own, self.bending, strict=True):
             own = part.vertices if bending is None else part.vertices + bending.displacements(index)
             placed = self.origins[index, part.body] + own @ self.rotations[index, part.body].T
             if part.to is not None:
                 placed[-1] = self.origins[index, part.to] + self.rotations[index, part.to] @ part.vertices[-1]
-            found.append(placed)
-        return found if self.forms is None else found + self.forms.vertices(self.origins[index], self.rotations[index])
+            result.append(placed)
+        return result if self.forms is None else result + self.forms.vertices(self.origins[index], self.rotations[index])
 
     def points(self) -> np.ndarray:
         """Points of joints, bodies and springs at every time, (n_t, n, 3); none without forms."""

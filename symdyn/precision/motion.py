@@ -93,7 +93,7 @@ class Precise:
         if name not in self._programs:
             usual = self._made(self.equations, name)
             self._programs[name] = self._usual[name] = usual
-            if self.equations.otherwise is not None:
+            if self.equations.singular_fallback is not None:
                 known: list[Callable[[Sequence[Any]], list[Any]]] = []
 
                 def either(x: Sequence[Any]) -> list[Any]:
@@ -101,7 +101,7 @@ class Precise:
                         return usual(x)
                     except Lost:
                         if not known:
-                            known.append(self._made(self.equations.otherwise, name))
+                            known.append(self._made(self.equations.singular_fallback, name))
                         return known[0](x)
 
                 self._programs[name] = either

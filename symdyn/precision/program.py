@@ -117,15 +117,15 @@ class _Writer(Arithmetic):
             value = self.context.nan
         return value if isinstance(value, bool) else self.context.convert(value)._mpf_
 
-    def _call(self, kernel: Any, *args: Any) -> list[Any]:
+    def _call(self, intrinsic: Any, *args: Any) -> list[Any]:
         given = [self._number(a) for a in args]
         try:
-            return [value._mpf_ for value in kernel.precise(self.context, given)]
+            return [value._mpf_ for value in intrinsic.precise(self.context, given)]
         except Exception as error:
-            if isinstance(error, SymdynError) or not isinstance(kernel, UserFunction):
+            if isinstance(error, SymdynError) or not isinstance(intrinsic, UserFunction):
                 raise
             at = ", ".join(self.context.nstr(value, 6) for value in given)
-            raise EvaluationError(f"the Python text of {kernel.signature} raised {type(error).__name__} at ({at}): "
+            raise EvaluationError(f"the Python text of {intrinsic.signature} raised {type(error).__name__} at ({at}): "
                                   f"{error}") from error
 
     def _number(self, value: Any) -> Any:

@@ -70,14 +70,14 @@ class TooRough(SymdynError):
 
 def compiler() -> Compiler | None:
     """The compiler of this machine as it is called here; None if it has no such numbers."""
-    found = find_compiler()
-    return _tried(found) if found is not None and found.kind == "gcc" else None
+    result = find_compiler()
+    return _tried(result) if result is not None and result.kind == "gcc" else None
 
 
 @functools.cache
-def _tried(found: Compiler) -> Compiler | None:
+def _tried(result: Compiler) -> Compiler | None:
     # Every operation is a call: optimization gains a tenth, and takes several times as long to compile.
-    made = replace(found, command=(*found.command, "-std=gnu99", "-O0", "-Wl,--no-as-needed", "-lquadmath"))
+    made = replace(result, command=(*result.command, "-std=gnu99", "-O0", "-Wl,--no-as-needed", "-lquadmath"))
     try:
         cache.load(f"{_HEAD}void symdyn_quad(quad *x) {{ *x = sqrtq(*x); }}\n", "quad", made)
     except CompileError:
@@ -145,15 +145,16 @@ def source(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[st
     if there is an entry for every free leaf but the first."""
     writer = _Writer(context, fixed, free)
     texts = walk(tape.steps, writer)
-    lines, kernels = writer.lines, writer.kernels
+    lines, intrinsics = writer.lines, writer.intrinsics
     entries = [texts.of(e) for output in tape.outputs.values() for e in output.entries]
     lines += [f"out[{k}] = {entry};" for k, entry in enumerate(entries)]
     body = "\n".join(f"    {line}" for line in [*lines, "return 0;"])
     rule = _MIDPOINT % len(entries) if len(entries) == len(free) - 1 else ""
-    return f"{_HEAD}{''.join(map(_kernel, sorted(kernels)))}int symdyn_quad(const quad *x, quad *out) {{\n{body}\n}}\n{rule}"
+    called = "".join(map(_intrinsic, sorted(intrinsics)))
+    return f"{_HEAD}{called}int symdyn_quad(const quad *x, quad *out) {{\n{body}\n}}\n{rule}"
 
 
-def _kernel(name: str) -> str:
+def _intrinsic(name: str) -> str:
     """The text of a numeric algorithm, its doubles made these numbers."""
     text = re.sub(r"//.*|#.*", "", (templates_folder() / "c" / "runtime" / f"{name}.h").read_text(encoding="utf-8"))
     text = text.replace("SYMDYN_LINKED ", "static ")
@@ -167,7 +168,7 @@ class _Writer(Arithmetic):
     def __init__(self, context: Any, fixed: Mapping[str, Any], free: Sequence[str]) -> None:
         self.context, self.fixed, self.places = context, fixed, {name: k for k, name in enumerate(free)}
         self.lines: list[str] = []
-        self.kernels: set[str] = set()
+        self.intrinsics: set[str] = set()
 
     def leaf(self, node: Node) -> str:
         name = node.args[1]
@@ -189,13 +190,13 @@ class _Writer(Arithmetic):
         return self._assigned(node, _WRITTEN[op].format(*args) if op in _WRITTEN else f"{op}q({', '.join(args)})")
 
     def call(self, node: Node, args: list[str]) -> str:
-        kernel = node.args[0]
-        if isinstance(kernel, UserFunction) or kernel.name not in _KERNELS:
-            raise NotInQuad(f"{kernel.name} has no text with {BITS} binary digits")
-        self.kernels.add(kernel.name)
-        sizes = "".join(f"{n}, " for n in kernel.sizes)
-        self.lines += [f"const quad a{node.index}[] = {{ {', '.join(args)} }};", f"quad v{node.index}[{kernel.n_out}];",
-                       f"if ({kernel.name}({sizes}a{node.index}, v{node.index})) return {_LOST};"]
+        intrinsic = node.args[0]
+        if isinstance(intrinsic, UserFunction) or intrinsic.name not in _KERNELS:
+            raise NotInQuad(f"{intrinsic.name} has no text with {BITS} binary digits")
+        self.intrinsics.add(intrinsic.name)
+        sizes = "".join(f"{n}, " for n in intrinsic.sizes)
+        self.lines += [f"const quad a{node.index}[] = {{ {', '.join(args)} }};", f"quad v{node.index}[{intrinsic.n_out}];",
+                       f"if ({intrinsic.name}({sizes}a{node.index}, v{node.index})) return {_LOST};"]
         return f"v{node.index}"
 
     def item(self, node: Node, results: str) -> str:
@@ -224,12 +225,12 @@ def to_bytes(values: Sequence[tuple[int, int, int, int]]) -> bytes:
         sign, mantissa, exponent, bits = value
         if bits > BITS:
             sign, mantissa, exponent, bits = libmp.mpf_pos(value, BITS, "n")
-        place = exponent + bits - 1 + _BIAS
-        if (not mantissa and exponent) or place > 2 * _BIAS:
+        index = exponent + bits - 1 + _BIAS
+        if (not mantissa and exponent) or index > 2 * _BIAS:
             raise EvaluationError(f"{libmp.to_str(value, 5)} is no finite number of 128 bits")
         word = sign << 127
-        if mantissa and place > 0:
-            word |= place << (BITS - 1) | (mantissa << (BITS - bits)) & _FRACTION
+        if mantissa and index > 0:
+            word |= index << (BITS - 1) | (mantissa << (BITS - bits)) & _FRACTION
         words.append(word.to_bytes(16, "little"))
     return b"".join(words)
 

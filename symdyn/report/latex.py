@@ -111,7 +111,7 @@ def _intermediates(equations: Equations, name: str) -> list[tuple[Node, str]]:
     """Steps of the quantity that the derivation has named, and their names in LaTeX, in the order they are computed."""
     tape = equations.tape(name)
     own = set(tape.outputs[name].entries)
-    found: list[tuple[Node, str]] = []
+    result: list[tuple[Node, str]] = []
     operations: dict[Node, int] = {}
     kept: set[Node] = set()
     taken: set[str] = set()
@@ -124,8 +124,8 @@ def _intermediates(equations: Equations, name: str) -> list[tuple[Node, str]]:
         if text not in taken:
             taken.add(text)
             kept.add(node)
-            found.append((node, text))
-    return found
+            result.append((node, text))
+    return result
 
 
 def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: int = 0) -> Typeset:

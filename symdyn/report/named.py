@@ -145,8 +145,8 @@ def _of_derivation(output: Output, symbols: Mapping[Node, sp.Expr], labels: Mapp
 
 def _called(label: str) -> str:
     """What a label of the derivation means: "w3_x" is the angular velocity of link 3, x; "" if it says nothing."""
-    found = re.fullmatch(r"([A-Za-z]+?)(\d+)_([xyz]+)", label)
-    return f"{_LETTERS[found[1]]} of link {found[2]}, {found[3]}" if found and found[1] in _LETTERS else ""
+    result = re.fullmatch(r"([A-Za-z]+?)(\d+)_([xyz]+)", label)
+    return f"{_LETTERS[result[1]]} of link {result[2]}, {result[3]}" if result and result[1] in _LETTERS else ""
 
 
 class _BaseParameters:
@@ -174,10 +174,10 @@ class _BaseParameters:
     def meaning(self, p: Polynomial) -> str:
         """What a constant is in base parameters, where it is a sum of few."""
         left = dict(p)
-        found: list[sp.Expr] = []
+        result: list[sp.Expr] = []
         for name, own, leading in self.rows:
             for m in [m for m in left if _divides(leading, m)]:
-                if m not in left or len(found) > MANY:
+                if m not in left or len(result) > MANY:
                     continue
                 factor = _quotient(m, leading)
                 scale = Fraction(left[m]) / own[leading]
@@ -190,10 +190,10 @@ class _BaseParameters:
                 if len(after) < len(left):
                     left = after
                     outside = self.writer.tree_expression(self.writer.arranger.product(integer(scale), factor))
-                    found.append(sp.Mul(outside, sp.Symbol(name), evaluate=bool(outside.is_Number)))
-        if left or not found or len(found) > MANY:
+                    result.append(sp.Mul(outside, sp.Symbol(name), evaluate=bool(outside.is_Number)))
+        if left or not result or len(result) > MANY:
             return CONSTANT
-        return f"{CONSTANT}: {sp.Add(*found)}, of the base parameters"
+        return f"{CONSTANT}: {sp.Add(*result)}, of the base parameters"
 
 
 def _divides(a: Monomial, b: Monomial) -> bool:
@@ -218,10 +218,10 @@ def _with_units(steps: list[Step], units: Mapping[sp.Basic, Dimension | None]) -
 
 def _repeated(entries: list[sp.Expr], names: Iterator[sp.Symbol]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
     """What stands in several places under names, where it has two operations at least, and the entries in these."""
-    found, entries = sp.cse(entries, symbols=sp.numbered_symbols("p", cls=sp.Dummy), order="canonical")
+    result, entries = sp.cse(entries, symbols=sp.numbered_symbols("p", cls=sp.Dummy), order="canonical")
     written: dict[sp.Symbol, sp.Expr] = {}
     products = []
-    for symbol, e in found:
+    for symbol, e in result:
         e = e.xreplace(written)
         if sp.count_ops(e) >= WORTH_A_NAME:
             written[symbol] = next(names)

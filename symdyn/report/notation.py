@@ -96,8 +96,8 @@ def entry_latex(name: str, index: tuple[int, ...]) -> str:
 
 def _frame(name: str) -> str:
     """b2 is b with the index 2."""
-    found = re.fullmatch(r"(\D*)(\d*)", name)
-    if found is None:
+    result = re.fullmatch(r"(\D*)(\d*)", name)
+    if result is None:
         return str(sp.latex(sp.Symbol(name)))
-    letters, digits = found.groups()
+    letters, digits = result.groups()
     return f"{letters}_{{{digits}}}" if letters and digits else name

@@ -92,12 +92,12 @@ def _in_intermediates(equations: MotionEquations, names: Sequence[str]) -> list[
     value, steps = with_intermediates(Output("all", (len(entries),), entries), equations.printed_leaves(),
                                       equations.recorder.names)
     lines = _packed(steps)
-    place = 0
+    index = 0
     for name in names:
         shape = outputs[name].shape
         size = len(outputs[name].entries)
-        matrix = sp.Matrix(shape[0], shape[1] if len(shape) == 2 else 1, list(value)[place:place + size])
-        place += size
+        matrix = sp.Matrix(shape[0], shape[1] if len(shape) == 2 else 1, list(value)[index:index + size])
+        index += size
         if size:
             lines += matrix_lines(name_latex(name), name, matrix, WIDTH)
     return lines

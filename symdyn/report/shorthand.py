@@ -21,8 +21,8 @@ class Shorthand:
     """Sines and cosines of the expressions -> symbols; `legend` says what each stands for."""
 
     def __init__(self, expressions: Iterable[sp.Basic]) -> None:
-        found = set().union(*[e.atoms(sp.sin, sp.cos) for e in expressions])
-        angles = sorted({f.args[0] for f in found}, key=lambda a: (len(symbols_of(a)), sp.default_sort_key(a)))
+        result = set().union(*[e.atoms(sp.sin, sp.cos) for e in expressions])
+        angles = sorted({f.args[0] for f in result}, key=lambda a: (len(symbols_of(a)), sp.default_sort_key(a)))
         labels = {angle: _label(angle) for angle in angles}
         taken = list(labels.values())
         unique = {a: label if taken.count(label) == 1 else str(sp.latex(a)) for a, label in labels.items()}
@@ -31,7 +31,7 @@ class Shorthand:
         legend = []
         for angle in angles:
             for function, letter in letters.items():
-                if function(angle) in found:
+                if function(angle) in result:
                     short = f"{letter}_{{{unique[angle]}}}"
                     self.symbols[function(angle)] = Short(short, real=True)
                     legend.append((short, str(sp.latex(function(angle)))))

@@ -16,7 +16,7 @@ OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", "reactions", "position_correction", 
 # These grow with the square of the number of speeds, or faster: they are counted for so many speeds at most.
 DENSE, MOST_SPEEDS = ("mass_matrix", "J", "C_r"), 150
 # The right-hand side by the numeric algorithm, which takes over where a pivot vanishes.
-OTHERWISE = "rhs, algorithm"
+SINGULAR_FALLBACK = "rhs, algorithm"
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def rolled_rows(source: Source) -> tuple[RolledRow, ...]:
     """The functions of a source with loops."""
     size = sum(len(text) for text in source.files.values())
     program = source.program
-    ways = [way for f in (program.prologue, *program.functions) for way in (f, f.regular, f.otherwise) if way is not None]
+    ways = [way for f in (program.prologue, *program.functions) for way in (f, f.regular, f.singular_fallback) if way is not None]
     return tuple(RolledRow(f.name, len(f.loops), sum(f.loops), f.written, f.steps, size) for f in ways if f.loops)
 
 
@@ -122,8 +122,8 @@ def report(equations: Equations, backend: str, fallback: str = "", source: Sourc
             left_out.append(name)
         elif has_function(equations, name):
             rows.append(_row(name, function_tape(equations, name)))
-            if name == "rhs" and equations.otherwise is not None:
-                rows.append(_row(OTHERWISE, function_tape(equations.otherwise, name)))
+            if name == "rhs" and equations.singular_fallback is not None:
+                rows.append(_row(SINGULAR_FALLBACK, function_tape(equations.singular_fallback, name)))
     sizes = {"coordinates": len(s.coordinates), "speeds": len(s.speeds), "extra states": len(s.states),
              "inputs": len(s.inputs), "parameters": len(s.parameters)}
     if equations.constraints:

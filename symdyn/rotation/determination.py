@@ -218,11 +218,11 @@ def _short(square: Any) -> Any:
     return sp.trigsimp(square) if square.count_ops() <= 60 else square
 
 
-def _as_expressions(found: EulerSolutions, R: Any) -> EulerSolutions:
-    value = None if found.value is None else sp.Float(found.value)
-    return EulerSolutions(found.sequence, found.locked, sp.Matrix(np.asarray(found.angles).tolist()),
-                          sp.Matrix(np.asarray(found.other).tolist()),
-                          found.distance, found.sign, value, R)
+def _as_expressions(result: EulerSolutions, R: Any) -> EulerSolutions:
+    value = None if result.value is None else sp.Float(result.value)
+    return EulerSolutions(result.sequence, result.locked, sp.Matrix(np.asarray(result.angles).tolist()),
+                          sp.Matrix(np.asarray(result.other).tolist()),
+                          result.distance, result.sign, value, R)
 
 
 def _sentence(of: EulerSequence, locked: Any, distance: Any, sign: Any, value: Any) -> str:

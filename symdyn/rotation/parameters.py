@@ -191,8 +191,8 @@ def unit_parameters(algebra: Algebra, p: Any) -> Any:
         return p
     if (abs(size - 1) > UNIT).any():
         worst = int(np.argmax(abs(size - 1)))
-        found = tuple(float(f"{float(x):.6g}") for x in (p.reshape(-1, 4)[worst] if isinstance(algebra, Numbers) else p))
-        raise NotNormalized(f"the Euler parameters {found} have the norm {float(size.flat[worst]):.12g}, not 1 to {UNIT:g}; "
+        result = tuple(float(f"{float(x):.6g}") for x in (p.reshape(-1, 4)[worst] if isinstance(algebra, Numbers) else p))
+        raise NotNormalized(f"the Euler parameters {result} have the norm {float(size.flat[worst]):.12g}, not 1 to {UNIT:g}; "
                             "divide them by it: symdyn.rotation.normalized(p)")
     return p
 

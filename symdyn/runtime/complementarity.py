@@ -54,10 +54,10 @@ def lemke(M: np.ndarray, q: np.ndarray, cover: np.ndarray | None = None) -> Comp
         if leaving == extra:
             return _of_basis(M, q, basis, pivots)
         entering = leaving + n if leaving < n else leaving - n
-        found = _leaving(rows, basis, entering, extra, least)
-        if found is None:
+        result = _leaving(rows, basis, entering, extra, least)
+        if result is None:
             return None
-        row = found
+        row = result
     return None
 
 

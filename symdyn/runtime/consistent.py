@@ -28,7 +28,7 @@ from symdyn.runtime.constraints import (
 )
 from symdyn.runtime.inputs.inputs import inputs_at
 from symdyn.shown import name_of, shown
-from symdyn.tape.kernels import MASSLESS
+from symdyn.tape.intrinsics import MASSLESS
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -44,9 +44,9 @@ _RESTARTS = 8
 class NotConsistent(ArgumentError):
     """A start violates the constraints; `found` says which and by how much, the message also what to do."""
 
-    def __init__(self, found: str, advice: str = "") -> None:
-        super().__init__(found, advice)
-        self.found = found
+    def __init__(self, result: str, advice: str = "") -> None:
+        super().__init__(result, advice)
+        self.found = result
 
     def __str__(self) -> str:
         return "; ".join(filter(None, self.args))
@@ -134,8 +134,8 @@ def smallest_acceleration(module: Module, t: float, x: np.ndarray, params: np.nd
     J = module.evaluate("C_r", t, x, params) * module.evaluate("C_scale", t, x, params)[:, None]
     free = np.eye(search.n_u)[:, [k for k in range(search.n_u) if k not in search.kept_u]]
     change = search.smallest(x, J, gaps, free)
-    found = ud if change is None else ud + change
-    left = gaps - J @ (found - ud)
+    result = ud if change is None else ud + change
+    left = gaps - J @ (result - ud)
     # Gaps may be rounding themselves: what counts is the size of the terms, which they are a part of.
     terms = np.abs(J) @ np.abs(ud) + np.abs(module.evaluate("F_d", t, x, params) * module.evaluate("C_scale", t, x, params))
     size = float(np.maximum(terms, np.abs(gaps)).max(initial=0.0))
@@ -144,18 +144,18 @@ def smallest_acceleration(module: Module, t: float, x: np.ndarray, params: np.nd
         raise ArgumentError(f"{module.name}: no accelerations fulfil the constraints here{kept}: the nearest violate "
                             f"{listed(module, left, _GOOD * size)} (m/s^2); the position is singular, constraints contradict "
                             "each other, or too much is kept")
-    return found
+    return result
 
 
 def number(value: Any, what: str, owner: str) -> float:
     """A finite number; raises ArgumentError, with `what` as what to pass, for anything else."""
     try:
-        found = double(value)
+        result = double(value)
     except NotReal as error:
         raise ArgumentError(f"{owner}: pass {what}, found {shown(value)}: {error}") from None
-    if not np.isfinite(found):
+    if not np.isfinite(result):
         raise ArgumentError(f"{owner}: pass {what}, found {shown(value)}")
-    return found
+    return result
 
 
 class _Search:
@@ -178,13 +178,13 @@ class _Search:
             # Where steps do not reduce the residual, such as in a stretched position, a nearby start leads on.
             shift = 0.05 * attempt * self.length / self.velocities * random.standard_normal(self.n_u)
             start = x if attempt == 0 else self._moved(x, shift)
-            found = self._gauss_newton(start)
-            left = self._left(found)
+            result = self._gauss_newton(start)
+            left = self._left(result)
             if left <= _GOOD:
-                return found
+                return result
             if left < least:
-                best, least = found, left
-        self._refuse("positions", position_residual(self.module, self.t, best, self.p))
+                best, least = result, left
+        self._reject("positions", position_residual(self.module, self.t, best, self.p))
         raise AssertionError
 
     def _gauss_newton(self, x: np.ndarray) -> np.ndarray:
@@ -255,7 +255,7 @@ class _Search:
             x[self.n_q:self.n_q + self.n_u] += du
         residual = velocity_residual(self.module, self.t, x, self.p, guess)  # the result may well be rest
         if (np.abs(residual) > _GOOD).any():
-            self._refuse("speeds", residual)
+            self._reject("speeds", residual)
         u = x[self.n_q:self.n_q + self.n_u]
         u[np.abs(u * self.velocities) <= 1e-15 * guess] = 0.0
         return x
@@ -296,7 +296,7 @@ class _Search:
     def _evaluate(self, name: str, x: np.ndarray) -> np.ndarray:
         return self.module.evaluate(name, self.t, x, self.p)
 
-    def _refuse(self, what: str, residual: np.ndarray) -> None:
+    def _reject(self, what: str, residual: np.ndarray) -> None:
         kept = f" with {', '.join(self.keep)} kept" if self.keep else ""
         advice = ("let go of one of them in keep, or begin" if self.keep else "begin") + " with another guess, or check lengths"
         raise ArgumentError(f"{self.module.name}: no consistent {what} found near the guess{kept}: the nearest violate "

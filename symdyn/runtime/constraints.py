@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 from symdyn.turning import is_angle, turns
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def names(module: Module) -> list[str]:
 
 def length(module: Module, params: Any) -> float:
     """The mechanism's length, m."""
-    module.unit("rhs")  # it is there, too
+    module.library("rhs")  # it is there, too
     return float(module.evaluate("length", 0.0, np.zeros(module.metadata.sizes.x), params))
 
 
@@ -60,7 +60,7 @@ def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: flo
 
 def _violation(module: Module, t: Any, x: Any, params: Any) -> tuple[np.ndarray, np.ndarray]:
     """C C_scale, m, and C_dot C_scale, m/s, each (..., n_c)."""
-    module.unit("rhs")  # it is there, too
+    module.library("rhs")  # it is there, too
     rows, n_c = module.evaluate("violation", t, x, params), len(names(module))
     return rows[..., :n_c], rows[..., n_c:]
 
@@ -87,9 +87,9 @@ def counted(values: np.ndarray, tolerance: float = RANK) -> np.ndarray:
 
 def derivatives(module: Module, of: str, t: float, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of C or C_dot, as `of` says, by the state and by the parameters: (n_c, n_x), (n_c, n_p)."""
-    found = module.jacobian(t, x, p, wrt=["x", "params"], of=of)
-    assert found.x is not None and found.params is not None
-    return found.x, found.params
+    result = module.jacobian(t, x, p, wrt=["x", "params"], of=of)
+    assert result.x is not None and result.params is not None
+    return result.x, result.params
 
 
 def holding(module: Module, t: float, x: np.ndarray, p: np.ndarray, parameters: Sequence[str]) -> list[str]:

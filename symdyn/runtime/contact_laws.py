@@ -127,20 +127,20 @@ def _with_static_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], s
             steep.append(k)
     if not steep:
         return _of_one_friction(D, b, sites)
-    found = []
+    result = []
     for one in _of_one_friction(D, b, [replace(site, kinetic=site.static) if k in steep else site
                                        for k, site in enumerate(sites)]):
         slides = [k for k in steep if one.modes[k].kind == SLIDING and not one.modes[k].kept]
         kept = [k for k in slides if _may_be_kept(D, sites, k) and _is_kept(D, sites, one.modes, k)]
         slides = [k for k in slides if k not in kept]
         if slides:
-            found += _with_static_friction(D, b, [replace(site, excluded=tuple({*site.excluded, STICKING})) if k in slides
-                                                  else site for k, site in enumerate(sites)], (*slipping, *slides))
+            result += _with_static_friction(D, b, [replace(site, excluded=tuple({*site.excluded, STICKING})) if k in slides
+                                                   else site for k, site in enumerate(sites)], (*slipping, *slides))
         else:
             modes = [replace(mode, direction=mode.direction * (sites[k].static / sites[k].kinetic), kept=True) if k in kept
                      else mode for k, mode in enumerate(one.modes)]
-            found.append(replace(one, modes=tuple(modes)))
-    return _different(b, found)
+            result.append(replace(one, modes=tuple(modes)))
+    return _different(b, result)
 
 
 def _may_be_kept(D: np.ndarray, sites: Sequence[Site], k: int) -> bool:
@@ -174,10 +174,10 @@ def _of_one_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> lis
         return (_one_bounded if sites[0].bounded else _one)(D, b, sites[0])
     options = [list(_options(site)) for site in sites]
     if all(len(site.tangents) < 2 for site in sites) and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS:
-        found = [one for one in _Table(D, b, sites, options).solved(list(product(*[range(len(o)) for o in options]))) if one]
+        result = [one for one in _Table(D, b, sites, options).solved(list(product(*[range(len(o)) for o in options]))) if one]
     else:
-        found = _by_lemke(D, b, sites) or _first(D, b, sites, options)
-    return _different(b, found)
+        result = _by_lemke(D, b, sites) or _first(D, b, sites, options)
+    return _different(b, result)
 
 
 def _is_simple(sites: Sequence[Site]) -> bool:
@@ -191,10 +191,10 @@ def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
     impacts."""
     k, tangents = site.rows[0], site.tangents
     size = max(float(np.abs(b).max()), float(np.abs(D[:, k]).max()) * site.least, 1e-300)
-    found = []
+    result = []
     for mode in _options(site):
         if mode.kind == STICKING:
-            found += _sticks(D, b, site, mode, size)
+            result += _sticks(D, b, site, mode, size)
             continue
         column = np.zeros(len(b))
         column[k] = 1.0
@@ -204,7 +204,7 @@ def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
             lam = site.least if mode.kind != OPEN else 0.0
             w = b + gain * lam
             if w[k] >= -NOISE * size:
-                found.append(Solved((mode,), column * lam, w, False))
+                result.append(Solved((mode,), column * lam, w, False))
         elif gain[k] != 0:
             lam = -float(b[k]) / float(gain[k])
             w = b + gain * lam
@@ -212,8 +212,8 @@ def _one(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
             force = max(abs(lam) * float(np.abs(column).max()), size / max(float(np.diag(D).max()), 1e-300))
             along = site.slip is not None or float(w[tangents] @ mode.direction) >= -NOISE * size
             if lam >= site.least - NOISE * force and along:
-                found.append(Solved((mode,), column * lam, w, False))
-    return _different(b, found)
+                result.append(Solved((mode,), column * lam, w, False))
+    return _different(b, result)
 
 
 def _sticks(D: np.ndarray, b: np.ndarray, site: Site, mode: Mode, size: float) -> list[Solved]:
@@ -231,7 +231,7 @@ def _sticks(D: np.ndarray, b: np.ndarray, site: Site, mode: Mode, size: float) -
 
 def _one_bounded(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
     """The same of dry friction of one joint."""
-    found = []
+    result = []
     for mode in _options(site):
         if mode.kind == STICKING:
             lam = -float(b[0]) / float(D[0, 0]) if D[0, 0] else 0.0
@@ -242,13 +242,13 @@ def _one_bounded(D: np.ndarray, b: np.ndarray, site: Site) -> list[Solved]:
             size = max(abs(float(b[0])), float(D[0, 0]) * site.static)
             good = site.slip is not None or w * float(mode.direction[0]) >= -NOISE * size
         if good:
-            found.append(Solved((mode,), np.array([lam]), np.array([w]), False))
-    return _different(b, found)
+            result.append(Solved((mode,), np.array([lam]), np.array([w]), False))
+    return _different(b, result)
 
 
-def _different(b: np.ndarray, found: Sequence[Solved]) -> list[Solved]:
+def _different(b: np.ndarray, result: Sequence[Solved]) -> list[Solved]:
     different: list[Solved] = []
-    for one in found:
+    for one in result:
         size = max(np.abs(one.w).max(initial=0.0), np.abs(b).max(initial=0.0))
         if all(np.abs(one.w - other.w).max(initial=0.0) > DIFFERENT * size for other in different):
             different.append(one)
@@ -262,8 +262,8 @@ def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved)
         return []
     size = float(np.abs(b).max(initial=0.0))
     force = max(float(np.abs(one.lam).max(initial=0.0)), size / max(float(np.diag(D).max(initial=0.0)), 1e-300))
-    found = []
-    for place, site in enumerate(sites):
+    result = []
+    for index, site in enumerate(sites):
         if site.excluded:
             continue
         k, tangents = site.normal, site.tangents
@@ -271,8 +271,8 @@ def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved)
         bound = site.limit(one.lam) - np.linalg.norm(one.lam[tangents])
         at_bound = bool(tangents) and site.slip is None and site.static > 0 and slip <= NOISE * size and bound <= NOISE * force
         if at_bound if pressing else abs(one.w[k]) <= NOISE * size:
-            found.append(place)
-    return found
+            result.append(index)
+    return result
 
 
 def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Sequence[Site], law: str) -> list[Solved]:
@@ -287,12 +287,12 @@ def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Se
         back[normal] = e * np.minimum(v[normal], 0.0)
         return [Solved(one.modes, one.lam, one.w - back, one.shared) for one in solutions(D, v + back, sites)]
     pressed = solutions(D, v, sites)
-    found = []
+    result = []
     for one in pressed:
         least = e * one.lam[normal]
         after = [Site(s.rows, s.static, s.kinetic, None, float(p)) for s, p in zip(sites, least, strict=True)]
-        found += [Solved(two.modes, one.lam + two.lam, two.w, two.shared) for two in solutions(D, one.w, after)]
-    return found
+        result += [Solved(two.modes, one.lam + two.lam, two.w, two.shared) for two in solutions(D, one.w, after)]
+    return result
 
 
 def _options(site: Site) -> Iterator[Mode]:
@@ -371,20 +371,20 @@ class _Table:
         size = self.size
         force = np.maximum(np.abs(lam).max(axis=1, initial=0.0), size / max(np.diag(self.D).max(initial=0.0), 1e-300))
         result = np.zeros(chosen.shape, dtype=bool)
-        for place, (site, modes) in enumerate(zip(self.sites, self.options, strict=True)):
-            k, tangents, mode = site.normal, site.tangents, chosen[:, place]
+        for index, (site, modes) in enumerate(zip(self.sites, self.options, strict=True)):
+            k, tangents, mode = site.normal, site.tangents, chosen[:, index]
             if k is not None:
                 held = np.array([m.held for m in modes])[mode]
-                result[:, place] = np.where(held, lam[:, k] < site.least - NOISE * force, w[:, k] < -NOISE * size)
+                result[:, index] = np.where(held, lam[:, k] < site.least - NOISE * force, w[:, k] < -NOISE * size)
             if not tangents:
                 continue
             sticking = np.array([m.kind == STICKING for m in modes])[mode]
             cone = np.linalg.norm(lam[:, tangents], axis=1) > site.limit(lam) + NOISE * force
-            result[:, place] |= sticking & cone
+            result[:, index] |= sticking & cone
             if site.slip is None:
                 along = (w[:, tangents] * np.array([m.direction for m in modes])[mode]).sum(axis=1)
                 sliding = np.array([m.kind == SLIDING for m in modes])[mode]
-                result[:, place] |= sliding & (along < -NOISE * size)
+                result[:, index] |= sliding & (along < -NOISE * size)
         return result
 
     def shared_out(self, lam: np.ndarray, w: np.ndarray, least: bool = True) -> Solved | None:
@@ -405,10 +405,10 @@ class _Table:
             elif mode.held and site.normal is not None and (not mode.kept or mode.direction.any()):
                 cones.append(Cone(site.normal, (), 1.0))
         right = -(self.b + self.D @ fixed)[active]
-        found = shared_forces((self.D @ H)[np.ix_(active, active)], right, H[:, active], fixed, rows_of[active], cones)
-        if found.margin <= MARGIN or self.broken(only, found.lam[None], w[None]).any():
+        result = shared_forces((self.D @ H)[np.ix_(active, active)], right, H[:, active], fixed, rows_of[active], cones)
+        if result.margin <= MARGIN or self.broken(only, result.lam[None], w[None]).any():
             return None
-        return Solved(modes, found.lam, w, True, found.softness, found.softness is None)
+        return Solved(modes, result.lam, w, True, result.softness, result.softness is None)
 
     def _only(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """H, fixed and the places of the active unknowns of the only combination."""
@@ -430,20 +430,20 @@ class _Table:
             return []
         # As many forces as can be: the largest sum of parts from 0 to 1, in LIGHT of the largest force, that are below them.
         (n, m), most = free.shape, LIGHT * np.eye(len(places))
-        found = linprog(np.append(np.zeros(m), -np.ones(n)), np.hstack([-free, most]), np.maximum(lam[normals] / force, 0.0),
-                        bounds=[(None, None)] * m + [(0, 1)] * n)
-        return [k for k, part in zip(places, found.x[m:].tolist(), strict=True) if part < 0.5] if found.success else []
+        result = linprog(np.append(np.zeros(m), -np.ones(n)), np.hstack([-free, most]), np.maximum(lam[normals] / force, 0.0),
+                         bounds=[(None, None)] * m + [(0, 1)] * n)
+        return [k for k, part in zip(places, result.x[m:].tolist(), strict=True) if part < 0.5] if result.success else []
 
     def solved(self, combinations: Sequence[Sequence[int]]) -> list[Solved | None]:
         """The solution of each combination; None where it breaks an inequality."""
-        found: list[Solved | None] = []
+        result: list[Solved | None] = []
         for first in range(0, len(combinations), AT_ONCE):
             chosen = np.array(combinations[first:first + AT_ONCE], dtype=int)
             lam, w, exact, shared = self.linear(chosen)
             good = exact & ~self.broken(chosen, lam, w).any(axis=1)
-            found += [Solved(tuple(o[k] for o, k in zip(self.options, row, strict=True)), lam[i], w[i], bool(shared[i]))
-                      if good[i] else None for i, row in enumerate(chosen)]
-        return found
+            result += [Solved(tuple(o[k] for o, k in zip(self.options, row, strict=True)), lam[i], w[i], bool(shared[i]))
+                       if good[i] else None for i, row in enumerate(chosen)]
+        return result
 
 
 def _least_norm(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -478,7 +478,7 @@ def _first(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], options: Sequenc
 def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
     """Solutions that Lemke's method comes to from different covering vectors; in space the first, for the round cone."""
     stream = np.random.default_rng(0)
-    planar, found = all(len(site.tangents) < 2 for site in sites), list[Solved]()
+    planar, result = all(len(site.tangents) < 2 for site in sites), list[Solved]()
     still = [next((mode for mode in _options(site) if mode.held), None) for site in sites]
     if not planar and all(mode is not None and (mode.kind == STICKING or site.slip is not None or not site.tangents)
                           for mode, site in zip(still, sites, strict=True)):
@@ -486,22 +486,22 @@ def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
         if one is not None:
             return [one]
     for k in range(COVERS):
-        if found and not planar:
+        if result and not planar:
             break
         weights = None if k == 0 else stream.uniform(0.1, 1.0, 64)
         answer = _modes_by_lemke(D, b, sites, weights)
         one = _repaired(D, b, sites, *answer) if answer is not None else None
         if one is not None:
-            found.append(one)
-    return found
+            result.append(one)
+    return result
 
 
 def _modes_by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site],
                     weights: np.ndarray | None) -> tuple[tuple[Mode, ...], np.ndarray] | None:
     """Modes and forces by the complementarity problem with a cone of facets; None where there is no solution."""
     problem = _Faceted(D, b, sites)
-    found = lemke(problem.M, problem.q, None if weights is None else np.resize(weights, len(problem.q)))
-    return None if found is None else (problem.modes(found.z, found.w), problem.W.T @ found.z + problem.lam_0)
+    result = lemke(problem.M, problem.q, None if weights is None else np.resize(weights, len(problem.q)))
+    return None if result is None else (problem.modes(result.z, result.w), problem.W.T @ result.z + problem.lam_0)
 
 
 class _Faceted:
@@ -515,10 +515,10 @@ class _Faceted:
         speeds: list[tuple[int, int, int]] = []  # place of gamma, of the normal force, site
         lam_0 = np.zeros(len(b))
         n = 0
-        for place, site in enumerate(sites):
+        for index, site in enumerate(sites):
             if {STICKING, SLIDING} <= set(site.excluded):
                 continue
-            self.first[place] = n
+            self.first[index] = n
             k, tangents = site.normal, site.tangents
             column = np.zeros(len(b))
             if tangents and site.slip is not None:
@@ -536,7 +536,7 @@ class _Faceted:
                     column[tangents] = direction
                     columns.append(column)
                     n += 1
-                speeds.append((n, self.first[place], place))
+                speeds.append((n, self.first[index], index))
                 columns.append(np.zeros(len(b)))
                 n += 1
         W = np.array(columns).reshape(n, len(b))
@@ -544,8 +544,8 @@ class _Faceted:
         at = b + D @ lam_0
         self.M, self.q = W @ D @ W.T, W @ at
         scale = max(float(np.abs(np.diag(D)).max(initial=0.0)), 1e-300)  # gamma in units of a force
-        for row, first, place in speeds:
-            site = sites[place]
+        for row, first, index in speeds:
+            site = sites[index]
             friction = site.kinetic if STICKING in site.excluded else site.static
             facets = list(range(first if site.bounded else first + 1, row))
             self.M[facets, row] = scale
@@ -557,25 +557,25 @@ class _Faceted:
     def modes(self, z: np.ndarray, w: np.ndarray) -> tuple[Mode, ...]:
         """What each contact does."""
         small_z, small_w = (NOISE * max(float(np.abs(v).max(initial=0.0)), 1e-300) for v in (z, self.q))
-        found: list[Mode] = []
-        for place, site in enumerate(self.sites):
+        result: list[Mode] = []
+        for index, site in enumerate(self.sites):
             n_tangents = len(site.tangents)
-            if place not in self.first:
-                found.append(Mode(OPEN, np.zeros(n_tangents), False))
+            if index not in self.first:
+                result.append(Mode(OPEN, np.zeros(n_tangents), False))
                 continue
-            k = self.first[place]
+            k = self.first[index]
             held = site.bounded or bool(w[k] <= small_w) or bool(z[k] > small_z)
             if not held and site.least == 0:
-                found.append(Mode(OPEN, np.zeros(n_tangents), False))
+                result.append(Mode(OPEN, np.zeros(n_tangents), False))
             elif not n_tangents or site.slip is not None:
-                found.append(Mode(SLIDING, np.zeros(n_tangents) if site.slip is None else site.slip, held))
+                result.append(Mode(SLIDING, np.zeros(n_tangents) if site.slip is None else site.slip, held))
             else:
                 facets, first = _facets(n_tangents), k if site.bounded else k + 1
                 force = z[first:first + len(facets)] @ facets
                 size = np.linalg.norm(force)
                 slides = size > small_z and (STICKING in site.excluded or z[first + len(facets)] > small_z)
-                found.append(Mode(SLIDING, -force / size, held) if slides else Mode(STICKING, np.zeros(n_tangents), held))
-        return tuple(found)
+                result.append(Mode(SLIDING, -force / size, held) if slides else Mode(STICKING, np.zeros(n_tangents), held))
+        return tuple(result)
 
 
 def _facets(n: int) -> np.ndarray:
@@ -655,8 +655,8 @@ def _other(site: Site, mode: Mode, lam: np.ndarray, w: np.ndarray) -> Mode:
 
 def _linear(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode]) -> np.ndarray:
     """w of given modes."""
-    found: np.ndarray = _Table(D, b, sites, [[m] for m in modes]).linear(np.zeros((1, len(sites)), dtype=int))[1][0]
-    return found
+    result: np.ndarray = _Table(D, b, sites, [[m] for m in modes]).linear(np.zeros((1, len(sites)), dtype=int))[1][0]
+    return result
 
 
 def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode],
@@ -676,10 +676,10 @@ def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
     for _ in range(ROUNDS):
         before = [chosen[k].direction for k in unknown]
         for k in unknown:
-            found = _direction(D, b, sites, chosen, k)
-            if found is None:
+            result = _direction(D, b, sites, chosen, k)
+            if result is None:
                 return None
-            chosen[k] = Mode(SLIDING, found, chosen[k].held)
+            chosen[k] = Mode(SLIDING, result, chosen[k].held)
         if all(np.abs(chosen[k].direction - old).max() < 1e-14 for k, old in zip(unknown, before, strict=True)):
             break
     return tuple(chosen)
@@ -717,10 +717,10 @@ def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequ
     values, along = across(angles[None, :])
     if np.abs(values).max() > NOISE * scale or (along < -NOISE * scale).any():
         return None
-    found = list(modes)
+    result = list(modes)
     for k, angle in zip(places, angles, strict=True):
-        found[k] = Mode(SLIDING, np.array([np.cos(angle), np.sin(angle)]), modes[k].held)
-    return tuple(found)
+        result[k] = Mode(SLIDING, np.array([np.cos(angle), np.sin(angle)]), modes[k].held)
+    return tuple(result)
 
 
 def _direction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], k: int) -> np.ndarray | None:

@@ -26,9 +26,9 @@ class Labelled(np.ndarray):
         expected = tuple(len(n) for n in names)
         if array.shape != expected:
             raise ArgumentError(f"an array of the shape {array.shape} cannot have names of {expected} entries")
-        found = array.view(cls)
-        found.names, found.units = tuple(tuple(n) for n in names), dict(units or {})
-        return found
+        result = array.view(cls)
+        result.names, result.units = tuple(tuple(n) for n in names), dict(units or {})
+        return result
 
     def __array_finalize__(self, origin: Any) -> None:
         self.names, self.units = (), {}

@@ -163,8 +163,8 @@ def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: 
                 **outputs.values(t, x, inputs)}
 
     def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
-        found = evaluate_rows(tape, at(t, x, inputs), len(t))
-        values, rows = found["values"].reshape(len(t)), found["slopes"].reshape(len(t), -1)
+        result = evaluate_rows(tape, at(t, x, inputs), len(t))
+        values, rows = result["values"].reshape(len(t)), result["slopes"].reshape(len(t), -1)
         if outputs.names:
             rows = outputs.folded(rows[:, None, :], t, x, inputs)[:, 0, 1:]
         others = rows[:, x.shape[1]:] if rows.shape[1] > x.shape[1] else None
@@ -172,12 +172,12 @@ def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: 
 
     def surfaces(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Surfaces:
         assert jumping is not None
-        found = evaluate_rows(jumping, at(t, x, inputs), len(t))
-        slopes = found["slopes"]
+        result = evaluate_rows(jumping, at(t, x, inputs), len(t))
+        slopes = result["slopes"]
         if outputs.names:
             slopes = outputs.folded(slopes[:, :, 1:], t, x, inputs) + np.pad(slopes[:, :, :1], (
                 (0, 0), (0, 0), (0, x.shape[1] + len(by))))
-        return Surfaces(found["surfaces"], slopes)
+        return Surfaces(result["surfaces"], slopes)
 
     return Cost(all_rows, smooth=all(map(_is_smooth, tape.steps)), surfaces=None if jumping is None else surfaces)
 
@@ -213,9 +213,9 @@ class _Outputs:
         part = lambda rows: np.asarray(rows).reshape(n, self.n_y, np.shape(rows)[-1])[:, self.places]
         others = np.concatenate([part(J.inputs), part(J.params)], axis=2)[:, :, self.by]
         along = np.concatenate([np.asarray(J.t).reshape(n, self.n_y, 1)[:, self.places], part(J.x), others], axis=2)
-        found = slopes[:, :, slopes.shape[2] - len(self.places):] @ along
-        found[:, :, 1:] += slopes[:, :, :slopes.shape[2] - len(self.places)]
-        return np.asarray(found)
+        result = slopes[:, :, slopes.shape[2] - len(self.places):] @ along
+        result[:, :, 1:] += slopes[:, :, :slopes.shape[2] - len(self.places)]
+        return np.asarray(result)
 
 
 @lru_cache(maxsize=64)  # an optimizer asks for the gradient of one loss many times
@@ -250,11 +250,11 @@ def _differentiated(what: str, expression: sp.Expr, states: Sequence[str], input
     if not used and all(map(is_zero, slopes[len(states):])):
         slopes = slopes[:len(states)]
     costs = Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
-    found = [jump.surface for jump in jumps(recorder, [value])]
-    if not found:
+    result = [jump.surface for jump in jumps(recorder, [value])]
+    if not result:
         return costs, None
-    rows = [reverse(recorder, surface, [leaves[name] for name in ("t", *states, *by, *used)]) for surface in found]
-    return costs, Tape.of(recorder, surfaces=np.array(found, dtype=object), slopes=np.array(rows, dtype=object))
+    rows = [reverse(recorder, surface, [leaves[name] for name in ("t", *states, *by, *used)]) for surface in result]
+    return costs, Tape.of(recorder, surfaces=np.array(result, dtype=object), slopes=np.array(rows, dtype=object))
 
 
 def _is_smooth(node: Node) -> bool:
@@ -274,7 +274,7 @@ def _finite(module: Module, what: str, t: np.ndarray, costs: Costs) -> Costs:
             continue
         bad = ~np.isfinite(rows).all(axis=1)
         if bad.any():
-            place = int(bad.argmax())
-            wrong = rows[place][~np.isfinite(rows[place])][0]
-            raise EvaluationError(f"{module.name}: {what} of the loss {kind} {wrong:g} at t = {t[place]:.6g} s")
+            index = int(bad.argmax())
+            wrong = rows[index][~np.isfinite(rows[index])][0]
+            raise EvaluationError(f"{module.name}: {what} of the loss {kind} {wrong:g} at t = {t[index]:.6g} s")
     return costs

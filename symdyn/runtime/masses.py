@@ -27,11 +27,11 @@ def real_parameters(module: Module, params: Any) -> np.ndarray:
 
 def negative_masses(module: Module, params: np.ndarray) -> dict[int, str]:
     """What to say of rows of parameters (n, n_p) in which one that stands alone as the mass of a body is negative, by row."""
-    found: dict[int, str] = {}
+    result: dict[int, str] = {}
     masses = module.metadata.masses
     for name, column in zip(module.metadata.parameters, params.T, strict=True):
         if name in masses:
             for k in np.flatnonzero(column < 0).tolist():
-                found.setdefault(k, f"{module.name}: the parameter {name}, the mass of body {shown(masses[name])}, is "
+                result.setdefault(k, f"{module.name}: the parameter {name}, the mass of body {shown(masses[name])}, is "
                                     f"{column[k]:g} kg; pass a number that is not below zero")
-    return found
+    return result

@@ -19,16 +19,16 @@ def available() -> int:
 
     Where the system does not report it (Windows, macOS), a bound of 1 TiB, or the physical memory.
     """
-    found = [2**40]
+    result = [2**40]
     with contextlib.suppress(OSError, ValueError, IndexError, StopIteration):
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        found.append(1024 * int(next(line for line in lines if line.startswith("MemAvailable:")).split()[1]))
+        result.append(1024 * int(next(line for line in lines if line.startswith("MemAvailable:")).split()[1]))
     with contextlib.suppress(OSError, ValueError, AttributeError):
-        found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        result.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for limit, used in _GROUPS:
         with contextlib.suppress(OSError, ValueError):  # "max" is no number: there is no limit
-            found.append(int(Path(limit).read_text(encoding="ascii")) - int(Path(used).read_text(encoding="ascii")))
-    return max(0, min(found))
+            result.append(int(Path(limit).read_text(encoding="ascii")) - int(Path(used).read_text(encoding="ascii")))
+    return max(0, min(result))
 
 
 def demand(numbers: int, owner: str, what: str, remedy: str) -> None:

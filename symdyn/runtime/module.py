@@ -21,7 +21,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.kinds import text
 from symdyn.pages import table, titled
 from symdyn.real_numbers import DOUBLE, number_of, real_of
-from symdyn.runtime.building.library import Evaluator, Unit
+from symdyn.runtime.building.library import Evaluator, Library
 from symdyn.runtime.calls import Call, ordered
 from symdyn.runtime.inputs.sampled import Sampled
 from symdyn.runtime.inputs.tables import Table
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     # A state: in order, by name or symbol, as (q, u), or with all that belongs to it.
     Start: TypeAlias = Values | tuple[Row, Row] | Equilibrium | Solution
 
-Provider = Callable[[str | RightSide], Unit]
+Provider = Callable[[str | RightSide], Library]
 # Times that the generated code takes as they are.
 _TIMES = (float, np.float64)
 _WHOLE = 2**53
@@ -98,7 +98,8 @@ class Module:
     """Functions of a mechanism.
 
     metadata   names, order, shapes, units, defaults
-    provider   function name, or what a right-hand side is made with -> unit that has it; called once for each, at its first use
+    provider   function name, or what a right-hand side is made with -> library that has it; called once for each, when it is
+               first used
 
     Parameters are given as an array in the order of `metadata.parameters`, or as a mapping from names or symbols;
     what is left out takes its default. Every function takes one state, or arrays with the states along the first axis.
@@ -116,7 +117,7 @@ class Module:
         self.backend = backend
         self.fallback = fallback
         self._provider = provider
-        self._units: dict[str | RightSide, Unit] = {}
+        self._libraries: dict[str | RightSide, Library] = {}
         self._writer = writer
         self._reporter = reporter
         self._local, self._notes = threading.local(), threading.local()
@@ -188,8 +189,8 @@ class Module:
         """
         from symdyn.runtime.batches.states import rhs_batch
 
-        found: np.ndarray | OnDevice = rhs_batch(self, t, x, params, inputs, out, device, precision)
-        return found
+        result: np.ndarray | OnDevice = rhs_batch(self, t, x, params, inputs, out, device, precision)
+        return result
 
     @property
     def batch_width(self) -> int:
@@ -220,7 +221,7 @@ class Module:
         if self._left_out is not None and not (isinstance(inputs, Mapping) or np.size(inputs)):
             inputs = self._left_out(t)
         free = self._rows(inputs, "inputs", "inputs")
-        acceleration = self._rows(ud, "ud", "ud", self._unit(name).metadata)
+        acceleration = self._rows(ud, "ud", "ud", self._library(name).metadata)
         times = real_of(t, self.name, "t must be a finite time, or one for each state")
         if times.ndim > 1 or not np.isfinite(times).all():
             raise ArgumentError(f"{self.name}: t must be a finite time, or one for each state, found {shown(t)}")
@@ -442,13 +443,13 @@ class Module:
             raise ArgumentError(f"{self.name}: jacobian by {', '.join(map(name_of, unknown))} asked for; there are "
                                 f"{_BY}")
         names = self._derivatives(of)
-        if "ud" in wrt and "ud" not in self._unit(of).metadata.arguments[of]:
+        if "ud" in wrt and "ud" not in self._library(of).metadata.arguments[of]:
             raise ArgumentError(f"{self.name}: jacobian of {of} by ud asked for, and {of} takes no accelerations; leave ud "
                                 "out of wrt")
-        found = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
+        result = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
         if of in _OF_MULTIPLIERS:
             self._demand_unique_multipliers(of, t, x, params)
-        return FurtherDerivatives(**found) if {"t", "ud"}.intersection(wrt) else Jacobian(**found)
+        return FurtherDerivatives(**result) if {"t", "ud"}.intersection(wrt) else Jacobian(**result)
 
     def _demand_unique_multipliers(self, of: str, t: Times, x: States, params: States | None) -> None:
         """Raises EvaluationError where the motion does not determine all multipliers.
@@ -483,8 +484,8 @@ class Module:
         """
         self._weighted(wrt, "adjoint")
         given = self._with_weights(weights, (), 0)
-        found = {w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt}
-        return FurtherDerivatives(**found) if "t" in wrt else Jacobian(**found)
+        result = {w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt}
+        return FurtherDerivatives(**result) if "t" in wrt else Jacobian(**result)
 
     def hessian(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
                 wrt: Sequence[str] = ("x",), along: States | None = None) -> np.ndarray:
@@ -556,18 +557,18 @@ class Module:
         if not hasattr(self._provider, "structure"):
             raise ArgumentError(f"{self.name}: this module was put together without equations, so the structure of its "
                                 "derivatives is unknown; compile equations")
-        found = self.structure(name)
-        return found if found is not None else np.zeros(self.shape(name), dtype=bool)
+        result = self.structure(name)
+        return result if result is not None else np.zeros(self.shape(name), dtype=bool)
 
-    def places_of_jacobian(self) -> Places | None:
+    def jacobian_indices(self) -> Places | None:
         """Where `jacobian_x` may differ from zero, as places of rows and columns; None where that is unknown, as where the module
         was put together without equations.
 
-        >>> sd.systems.pendulum().compile(backend="numpy").places_of_jacobian().columns
+        >>> sd.systems.pendulum().compile(backend="numpy").jacobian_indices().columns
         array([1, 0])
         """
-        found: Places | None = getattr(self._provider, "places", None)
-        return found
+        result: Places | None = getattr(self._provider, "places", None)
+        return result
 
     def breaks(self) -> Tape | None:
         """Surfaces at which the right-hand side has a kink or a jump, a tape with the output `surfaces`; None where it has
@@ -576,8 +577,8 @@ class Module:
         >>> sd.systems.pendulum().compile(backend="numpy").breaks() is None
         True
         """
-        found: Tape | None = getattr(self._provider, "breaks", None) if self.metadata.not_smooth else None
-        return found
+        result: Tape | None = getattr(self._provider, "breaks", None) if self.metadata.not_smooth else None
+        return result
 
     def structure(self, name: str) -> np.ndarray | None:
         """Where a function that is a matrix of derivatives, such as hessian_x, may differ from zero; None where that is unknown.
@@ -586,13 +587,13 @@ class Module:
         array([[1, 0],
                [0, 0]])
         """
-        found: Callable[[str], np.ndarray | None] = getattr(self._provider, "structure", lambda name: None)
-        return found(name)
+        result: Callable[[str], np.ndarray | None] = getattr(self._provider, "structure", lambda name: None)
+        return result(name)
 
     def _derivatives(self, of: Any) -> dict[str, str]:
         """By what a function is differentiated -> the name of the function that does."""
         text(of, f"{self.name}: the name of the function to differentiate", "inverse_dynamics")
-        self._unit(of)
+        self._library(of)
         own = {f"{by}": f"jacobian_{by}" for by in ("x", "inputs", "params") if of == "rhs"}
         return {by: own.get(by, f"{of}_by_{by}") for by in FurtherDerivatives._fields}
 
@@ -603,7 +604,7 @@ class Module:
         >>> module.function("mass_matrix")([0.1])
         array([[1.]])
         """
-        self._unit(text(name, f"{self.name}: the name of a function", "mass_matrix"))
+        self._library(text(name, f"{self.name}: the name of a function", "mass_matrix"))
 
         def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = (),
                  ud: Any = ()) -> np.ndarray:
@@ -1119,9 +1120,9 @@ class Module:
         if self._reporter is None:
             raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
         from symdyn.runtime.batches.motions import many_at_once
-        from symdyn.runtime.batches.states import UNIT
+        from symdyn.runtime.batches.states import LIBRARY
 
-        return replace(self._reporter(), many=many_at_once(self, UNIT in self._units))
+        return replace(self._reporter(), many=many_at_once(self, LIBRARY in self._libraries))
 
     def write(self, folder: PathName) -> list[Path]:
         """Write the generated files, complete with header, example and reference vectors; returns their paths.
@@ -1219,15 +1220,15 @@ class Module:
         >>> module.shape("mass_matrix")
         (1, 1)
         """
-        return tuple(self._unit(name).metadata.shapes[name])
+        return tuple(self._library(name).metadata.shapes[name])
 
-    def unit(self, what: str | RightSide) -> Unit:
-        """The loaded unit that has a function, or a right-hand side with its integrator."""
-        return self._unit(what)
+    def library(self, what: str | RightSide) -> Library:
+        """The loaded library that has a function, or a right-hand side with its integrator."""
+        return self._library(what)
 
     def _has(self, what: str | RightSide) -> bool:
-        """Whether a unit is loaded already."""
-        return (RightSide() if what == "rhs" else what) in self._units
+        """Whether a library is loaded already."""
+        return (RightSide() if what == "rhs" else what) in self._libraries
 
     def _remembered(self, name: str, make: Callable[[], Any]) -> Any:
         """An object that this thread made under a name; it is made now if it was not."""
@@ -1236,24 +1237,24 @@ class Module:
             kept[name] = make()
         return kept[name]
 
-    def _unit(self, what: str | RightSide) -> Unit:
+    def _library(self, what: str | RightSide) -> Library:
         what = RightSide() if what == "rhs" else what
-        if what not in self._units:
+        if what not in self._libraries:
             note: Callable[[str], None] = getattr(self._notes, "take", lambda label: None)
             note(what if isinstance(what, str) else what.label)
             try:
                 self._make(what)
             finally:
                 note("")
-        return self._units[what]
+        return self._libraries[what]
 
     def _make(self, what: str | RightSide) -> None:
         with self._lock:  # the derivation behind it is for one thread at a time
-            if what not in self._units:
-                unit = self._units[what] = self._provider(what)
-                if what == RightSide() or what in unit.metadata.shapes:  # other right-hand sides have a "rhs" of their own
-                    for other in unit.metadata.shapes:
-                        self._units.setdefault(other, unit)
+            if what not in self._libraries:
+                library = self._libraries[what] = self._provider(what)
+                if what == RightSide() or what in library.metadata.shapes:  # other right-hand sides have a "rhs" of their own
+                    for other in library.metadata.shapes:
+                        self._libraries.setdefault(other, library)
 
     @contextlib.contextmanager
     def noting(self, note: Callable[[str], None]) -> Iterator[None]:
@@ -1281,7 +1282,7 @@ class Module:
         known = getattr(self._local, name, None)
         mark = _mark(params)
         if known is None or known[1] is not params or known[2] != mark:
-            evaluator = known[0] if known is not None else self._unit(name).evaluator(name)
+            evaluator = known[0] if known is not None else self._library(name).evaluator(name)
             evaluator.set_params(self.parameters(params))
             known = (evaluator, params, mark)
             setattr(self._local, name, known)
@@ -1381,7 +1382,7 @@ class BoundModule:
         return evaluator.one(time, state, free if free.size else self._inputs)  # type: ignore[no-any-return]
 
     def _ready(self, name: str) -> Any:
-        evaluator = self.module.unit(name).evaluator(name)
+        evaluator = self.module.library(name).evaluator(name)
         evaluator.set_params(self.params)
         setattr(self._local, name, evaluator)
         return evaluator

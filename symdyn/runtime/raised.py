@@ -85,8 +85,8 @@ def _said(error: BaseException) -> str:
 
 def _frames(error: BaseException) -> list[tuple[FrameType, int]]:
     """Frames that an exception went through, the innermost last, with the lines."""
-    found, trace = [], error.__traceback__
+    result, trace = [], error.__traceback__
     while trace is not None:
-        found.append((trace.tb_frame, trace.tb_lineno))
+        result.append((trace.tb_frame, trace.tb_lineno))
         trace = trace.tb_next
-    return found
+    return result

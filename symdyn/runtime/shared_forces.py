@@ -123,7 +123,7 @@ def _bound(lam: np.ndarray, cone: Cone) -> float:
 
 def _by_parts(softness: np.ndarray, N: np.ndarray) -> np.ndarray:
     """Softness from LEAST to 1 in every part of the rows whose forces change together."""
-    found, together = np.ones(len(softness)), np.abs(N @ N.T) > DEPENDENT
+    result, together = np.ones(len(softness)), np.abs(N @ N.T) > DEPENDENT
     left = set(range(len(softness)))
     while left:
         part, new = set[int](), {min(left)}
@@ -132,8 +132,8 @@ def _by_parts(softness: np.ndarray, N: np.ndarray) -> np.ndarray:
             new = {int(j) for k in new for j in np.flatnonzero(together[k])} - part
         left -= part
         rows = sorted(part)
-        found[rows] = np.clip(softness[rows] / max(float(softness[rows].max()), 1e-300), LEAST, 1.0)
-    return found
+        result[rows] = np.clip(softness[rows] / max(float(softness[rows].max()), 1e-300), LEAST, 1.0)
+    return result
 
 
 def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
@@ -176,8 +176,8 @@ def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tu
 
 def _distances(u: np.ndarray) -> np.ndarray:
     """u_0 - |u_T|, (n,)."""
-    found: np.ndarray = u[:, 0] - np.linalg.norm(u[:, 1:], axis=1)
-    return found
+    result: np.ndarray = u[:, 0] - np.linalg.norm(u[:, 1:], axis=1)
+    return result
 
 
 def _polished(parts: _Parts, v: np.ndarray, worth: np.ndarray,
@@ -185,13 +185,13 @@ def _polished(parts: _Parts, v: np.ndarray, worth: np.ndarray,
     """The largest margin to rounding, by Newton's method for the conditions of optimality of the cones that it is of, with what
     each is worth; None where it comes to another set of cones."""
     n, m = len(v), len(active)
-    found, w = v.copy(), worth[active]
+    result, w = v.copy(), worth[active]
     for _ in range(STEPS):
         F, J = np.zeros(n + m), np.zeros((n + m, n + m))
         F[n - 1] = 1.0
         for j, k in enumerate(active.tolist()):
             W = parts.W[k]
-            u = parts.start[k] + W @ found
+            u = parts.start[k] + W @ result
             size = float(np.linalg.norm(u[1:]))
             slope = W[0].copy()
             if size > 0:
@@ -202,9 +202,9 @@ def _polished(parts: _Parts, v: np.ndarray, worth: np.ndarray,
             F[n + j] = u[0] - size
             J[:n, n + j], J[n + j, :n] = slope, slope
         step = np.linalg.lstsq(J, -F, rcond=DEPENDENT)[0]
-        found, w = found + step[:n], w + step[n:]
+        result, w = result + step[:n], w + step[n:]
         if float(np.abs(step).max()) <= EXACT:
-            return (found, w) if (w >= 0).all() and _distances(parts.at(found)).min() >= -EXACT else None
+            return (result, w) if (w >= 0).all() and _distances(parts.at(result)).min() >= -EXACT else None
     return None
 
 

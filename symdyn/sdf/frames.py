@@ -58,9 +58,9 @@ class Frames:
                                        "relative to the model")
             self.poses[name] = Pose()
             return Pose()
-        found = self.pose(frame.relative_to or MODEL, frame.line, frame.what, (*waiting, name)) @ frame.pose
-        self.poses[name] = found
-        return found
+        result = self.pose(frame.relative_to or MODEL, frame.line, frame.what, (*waiting, name)) @ frame.pose
+        self.poses[name] = result
+        return result
 
     def between(self, outer: str, inner: str, line: int, what: str) -> Pose:
         """Of one frame in another, without rounding where it is written so."""

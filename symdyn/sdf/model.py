@@ -228,11 +228,11 @@ class Parser:
                        self._mimic(axis, what, scope), axis.line)
 
     def _mimic(self, axis: Element, what: str, scope: str) -> tuple[str, float, float, float] | None:
-        found = axis.find("mimic")
-        if found is None:
+        result = axis.find("mimic")
+        if result is None:
             return None
         f = self.faults
-        if found.attributes.get("axis", "axis") != "axis":
-            f.at(found.line, f"{what} mimics a second axis, which is not read; give the first")
-        return (self._named(f.name(found, "joint", f"{what}: mimic"), scope), f.number_in(found, "multiplier", what, 1.0),
-                f.number_in(found, "offset", what, 0.0), f.number_in(found, "reference", what, 0.0))
+        if result.attributes.get("axis", "axis") != "axis":
+            f.at(result.line, f"{what} mimics a second axis, which is not read; give the first")
+        return (self._named(f.name(result, "joint", f"{what}: mimic"), scope), f.number_in(result, "multiplier", what, 1.0),
+                f.number_in(result, "offset", what, 0.0), f.number_in(result, "reference", what, 0.0))

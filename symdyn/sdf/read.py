@@ -152,11 +152,11 @@ class _Builder:
                 self._root(name, root)
                 reached.add(name)
         while True:
-            found = next((j for link, j in carrying.items() if link not in reached and ends[j.name][0] in reached), None)
-            if found is None:
+            result = next((j for link, j in carrying.items() if link not in reached and ends[j.name][0] in reached), None)
+            if result is None:
                 break
-            self._join(found, ends[found.name], loop=False)
-            reached.add(ends[found.name][1])
+            self._join(result, ends[result.name], loop=False)
+            reached.add(ends[result.name][1])
         left = [j for link, j in carrying.items() if link not in reached]
         if left:
             self.faults.at(left[0].line, f"joints {', '.join(shown(j.name) for j in left)} hang on each other in a circle; "
@@ -204,9 +204,9 @@ class _Builder:
             self.built.add_joint(Fixed(label, self.built.ground, body, parent_point=_plain(pose.p),
                                        parent_rotation=_rows(pose.R)))
             return
-        found = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
-        self.built.add_joint(Free(label, self.built.ground, body, found, orientation=EulerParameters(), velocity="body"))
-        self.built.initial.update(zip(found, [*map(float, pose.p), *map(float, pose.quaternion)], strict=True))
+        result = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
+        self.built.add_joint(Free(label, self.built.ground, body, result, orientation=EulerParameters(), velocity="body"))
+        self.built.initial.update(zip(result, [*map(float, pose.p), *map(float, pose.quaternion)], strict=True))
 
     # -- joints
 

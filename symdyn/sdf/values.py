@@ -25,46 +25,46 @@ class Values(FileFaults):
 
     def number_in(self, parent: Element | None, tag: str, what: str, default: float) -> float:
         """The number that a child holds; default: where there is none."""
-        found = None if parent is None else parent.find(tag)
-        return default if found is None else self.numbers(found, what, 1)[0]
+        result = None if parent is None else parent.find(tag)
+        return default if result is None else self.numbers(result, what, 1)[0]
 
     def word(self, parent: Element, tag: str, what: str) -> str:
         """The text that a child holds, "" and a fault where there is none."""
-        found = parent.find(tag)
-        text = "" if found is None else found.text
+        result = parent.find(tag)
+        text = "" if result is None else result.text
         if not text:
             self.at(parent.line, f"{what} has no <{tag}>; write <{tag}>...</{tag}>")
         return text
 
     def true(self, parent: Element, tag: str) -> bool:
         """Whether a child holds true or 1."""
-        found = parent.find(tag)
-        return found is not None and found.text in ("true", "1")
+        result = parent.find(tag)
+        return result is not None and result.text in ("true", "1")
 
     def pose(self, parent: Element, what: str) -> tuple[str, Pose, int]:
         """The frame that the <pose> of an element is relative to ("": the default), the pose, and its line."""
-        found = parent.find("pose")
-        if found is None:
+        result = parent.find("pose")
+        if result is None:
             return "", Pose(), parent.line
-        if found.attributes.get("frame"):
-            self.at(found.line, f"{what}: <pose> has the attribute frame={shown(found.attributes['frame'])}, which versions "
+        if result.attributes.get("frame"):
+            self.at(result.line, f"{what}: <pose> has the attribute frame={shown(result.attributes['frame'])}, which versions "
                                 "before 1.7 "
                                 "left without a meaning; write relative_to of version 1.7")
-        form = found.attributes.get("rotation_format", "euler_rpy")
-        if not found.text:
+        form = result.attributes.get("rotation_format", "euler_rpy")
+        if not result.text:
             numbers = [0.0] * 6 if form == "euler_rpy" else [0.0] * 6 + [1.0]
         elif form not in ("euler_rpy", "quat_xyzw"):
-            self.at(found.line, f"{what}: <pose> has the rotation_format {shown(form)}; there are euler_rpy and quat_xyzw")
-            return "", Pose(), found.line
+            self.at(result.line, f"{what}: <pose> has the rotation_format {shown(form)}; there are euler_rpy and quat_xyzw")
+            return "", Pose(), result.line
         else:
-            numbers = self.numbers(found, what, 6 if form == "euler_rpy" else 7)
+            numbers = self.numbers(result, what, 6 if form == "euler_rpy" else 7)
         if form == "quat_xyzw":
-            R = self._turned(numbers[3:], what, found.line)
+            R = self._turned(numbers[3:], what, result.line)
         else:
-            degrees = found.attributes.get("degrees") in ("true", "1")
+            degrees = result.attributes.get("degrees") in ("true", "1")
             roll, pitch, yaw = (math.radians(a) for a in numbers[3:]) if degrees else numbers[3:]
             R = np.array(rotation((roll, pitch, yaw)))
-        return found.attributes.get("relative_to", ""), Pose(R, np.array(numbers[:3])), found.line
+        return result.attributes.get("relative_to", ""), Pose(R, np.array(numbers[:3])), result.line
 
     def _turned(self, quaternion: list[float], what: str, line: int) -> np.ndarray:
         x, y, z, w = quaternion

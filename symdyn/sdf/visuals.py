@@ -73,8 +73,8 @@ class Visuals:
 
     def _triple(self, shape: Element, tag: str, what: str) -> np.ndarray:
         """Three numbers that a child holds; 1 each where there is none."""
-        found = shape.find(tag)
-        return np.ones(3) if found is None else np.array(self.faults.numbers(found, what, 3))
+        result = shape.find(tag)
+        return np.ones(3) if result is None else np.array(self.faults.numbers(result, what, 3))
 
     def _mesh(self, shape: Element, what: str) -> list[Piece]:
         part = shape.find("submesh")
@@ -83,13 +83,13 @@ class Visuals:
                                   "the part a file of its own")
             return []
         name, scale = self.faults.word(shape, "uri", what), self._triple(shape, "scale", what)
-        found = self.files.pieces(name, shape.line, what) if name else []
-        return [Piece(p.vertices * scale, p.faces, p.color) for p in found]
+        result = self.files.pieces(name, shape.line, what) if name else []
+        return [Piece(p.vertices * scale, p.faces, p.color) for p in result]
 
     def _color(self, material: Element | None, what: str) -> tuple[float, ...] | None:
         """The diffuse colour of a material, else the ambient one; None where there is none."""
-        found = None if material is None else material.find("diffuse") or material.find("ambient")
-        if found is None:
+        result = None if material is None else material.find("diffuse") or material.find("ambient")
+        if result is None:
             return None
-        numbers = self.faults.numbers(found, what, 3 if len(found.text.split()) == 3 else 4)
+        numbers = self.faults.numbers(result, what, 3 if len(result.text.split()) == 3 else 4)
         return tuple(min(max(v, 0.0), 1.0) for v in numbers[:3])

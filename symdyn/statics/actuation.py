@@ -235,8 +235,8 @@ def _demand_consistent(module: Module, t: float, x: np.ndarray, p: np.ndarray) -
     try:
         check_start(module, t, x, p)
     except NotConsistent as error:
-        found = error.found.replace("the initial positions", "the positions q").replace("the initial speeds", "the speeds u")
-        raise ArgumentError(f"{found}; no forces make such a motion: take q, u = module.consistent(q, u, params), or pass "
+        result = error.found.replace("the initial positions", "the positions q").replace("the initial speeds", "the speeds u")
+        raise ArgumentError(f"{result}; no forces make such a motion: take q, u = module.consistent(q, u, params), or pass "
                             "project=True, which moves q, u and ud by as little as possible onto the constraints") from None
 
 
@@ -269,18 +269,18 @@ class _Balance:
 
     def forces(self, point: OperatingPoint) -> np.ndarray:
         """What the sought inputs, as they are, contribute, if linear; (n_u,)."""
-        found: np.ndarray = self.matrix(point) @ point.inputs[self.free]
-        return found
+        result: np.ndarray = self.matrix(point) @ point.inputs[self.free]
+        return result
 
     def matrix(self, point: OperatingPoint) -> np.ndarray:
         """Derivative of the generalized forces by the sought inputs, (n_u, n)."""
-        found: np.ndarray = point.evaluate("input_matrix")[:, self.free] if self.free else np.zeros((len(point.u), 0))
-        return found
+        result: np.ndarray = point.evaluate("input_matrix")[:, self.free] if self.free else np.zeros((len(point.u), 0))
+        return result
 
     def left(self, point: OperatingPoint) -> np.ndarray:
         """Forces along the freedoms, (freedoms,), N."""
-        found: np.ndarray = self.Z.T @ (self.scales * point.forces)
-        return found
+        result: np.ndarray = self.Z.T @ (self.scales * point.forces)
+        return result
 
     def solved(self, kept: tuple[str, ...]) -> Actuation:
         """The inputs that make the motion, and what belongs to them. Raises ArgumentError where there are none."""
@@ -308,16 +308,16 @@ class _Balance:
             if value is not None:
                 point = point.at(inputs=np.where(np.isin(np.arange(len(point.inputs)), self.free), value, point.inputs))
             try:
-                found = self._newton(point)
-                size, level = float(np.abs(self.left(found)).max(initial=0.0)), self.level(found)
+                result = self._newton(point)
+                size, level = float(np.abs(self.left(result)).max(initial=0.0)), self.level(result)
             except EvaluationError:
                 if value is None:
                     raise
                 continue  # one of the further starts is out of what the loads are defined for
             if size <= MADE * level:
-                return found
+                return result
             if size < least:
-                best, least = found, size
+                best, least = result, size
         return self._raise(best)
 
     def level(self, point: OperatingPoint) -> float:
@@ -328,7 +328,7 @@ class _Balance:
     def nonlinear(self) -> bool:
         """Whether the derivative by the inputs depends on inputs."""
         module = self.point.module
-        return bool(self.free) and "inputs" in module.unit("input_matrix").metadata.arguments["input_matrix"]
+        return bool(self.free) and "inputs" in module.library("input_matrix").metadata.arguments["input_matrix"]
 
     def _newton(self, point: OperatingPoint) -> OperatingPoint:
         """Newton's method with steps of least norm; linear equations take one step, and one for its rounding."""
@@ -424,16 +424,16 @@ class _Drive:
 
     def outside(self, forces: np.ndarray) -> np.ndarray:
         """The part of forces that no input makes."""
-        found: np.ndarray = forces - self.reached @ (self.reached.T @ forces)
-        return found
+        result: np.ndarray = forces - self.reached @ (self.reached.T @ forces)
+        return result
 
     def least(self, forces: np.ndarray) -> np.ndarray:
         """The inputs of least norm, in their own units, whose forces are these, but for what none makes."""
         if not self.rank:
             return np.zeros(self.R.shape[1])
         Q, upper = np.linalg.qr((self.reached.T @ self.R).T)
-        found: np.ndarray = Q @ np.linalg.solve(upper.T, self.reached.T @ forces)
-        return found
+        result: np.ndarray = Q @ np.linalg.solve(upper.T, self.reached.T @ forces)
+        return result
 
 
 def _values(point: OperatingPoint, sought: Sequence[str]) -> str:

@@ -83,21 +83,21 @@ class Analysis:
         x = np.where(sizes > UNMOVED * sizes.max(axis=0, initial=0.0), x, 0.0)
         energies = np.abs(np.einsum("ik,ij,jk->k", right[:n].conj(), manifold.M, right[:n]))
         sizes = np.abs(np.einsum("ik,ij,jk->k", right.conj(), np.eye(len(right)), right))
-        found = np.zeros(right.shape[1])
+        result = np.zeros(right.shape[1])
         moving = energies > 1e-20 * sizes
-        found[moving] = np.einsum("ik,ij,jk->k", x, damping, x)[moving] / (2 * energies[moving])
+        result[moving] = np.einsum("ik,ij,jk->k", x, damping, x)[moving] / (2 * energies[moving])
         speed = np.abs(_quotients(manifold.matrices[0] - (0.0 if turned is None else turned), right))
         turning = np.einsum("ik,ij,jk->k", x, circulating, x)
         fast = moving & (speed > 0)
-        found[fast] += turning[fast] / (2 * energies[fast] * speed[fast])
+        result[fast] += turning[fast] / (2 * energies[fast] * speed[fast])
         A, m = _beyond(manifold.matrices[0], noise.A.rounding), len(right)
         coupled = np.zeros((m, m))
         coupled[2 * n:], coupled[:, 2 * n:] = A[2 * n:], A[:, 2 * n:]
         if coupled.any():
             below = np.abs(np.einsum("ik,ik->k", left.conj(), right))
             above = np.einsum("ik,ij,jk->k", np.abs(left), np.abs(coupled), np.abs(right))
-            found += np.where(below > 0, above / np.where(below > 0, below, 1.0), 0.0)
-        return found
+            result += np.where(below > 0, above / np.where(below > 0, below, 1.0), 0.0)
+        return result
 
 
 def _quotients(A: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -108,8 +108,8 @@ def _quotients(A: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def _beyond(values: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Absolute values of the entries that are more than rounding, else 0."""
-    found = np.abs(values)
-    return np.asarray(np.where(found > noise, found, 0.0))
+    result = np.abs(values)
+    return np.asarray(np.where(result > noise, result, 0.0))
 
 
 def shapes_of(manifold: Manifold) -> Shapes:
@@ -145,25 +145,25 @@ def held_note(manifold: Manifold) -> list[str]:
     return [f"held: {', '.join(manifold.selection.held)}"] if manifold.selection.held else []
 
 
-def reason(found: Spectrum) -> str:
+def reason(result: Spectrum) -> str:
     """Why the verdict of a spectrum is what it is, with numbers."""
-    verdict = found.verdict
+    verdict = result.verdict
     text = WORDS[verdict]
-    margins = np.array([found.boundary.margin(complex(v)) for v in found.values])
+    margins = np.array([result.boundary.margin(complex(v)) for v in result.values])
     if verdict == "stable":
         return f"{text}: the largest is {margins.max():.6g} 1/s"
     if verdict == "unstable":
-        k = int(np.argmax(np.where(found.signs > 0, margins, -np.inf)))
-        known = float(min(found.radii[k], abs(margins[k])))
+        k = int(np.argmax(np.where(result.signs > 0, margins, -np.inf)))
+        known = float(min(result.radii[k], abs(margins[k])))
         return f"{text}: {margins[k]:.6g} 1/s" + (f", known to {decade(known)}" if known > 1e-6 * margins[k] else "")
     if verdict == "not decided":
-        k = int(found.undecided[np.argmax(found.radii[found.undecided])])
-        if found.boundary.neutral:
-            return f"{text}: a multiplier has the size 1 + {margins[k]:.3g}, known to {decade(float(found.radii[k]))} only"
-        known = float(min(found.radii[k], max(abs(found.values[k]), 1e-15)))
-        return f"{text}: {found.values[k].real:.3g} 1/s is known to {decade(known)} only"
+        k = int(result.undecided[np.argmax(result.radii[result.undecided])])
+        if result.boundary.neutral:
+            return f"{text}: a multiplier has the size 1 + {margins[k]:.3g}, known to {decade(float(result.radii[k]))} only"
+        known = float(min(result.radii[k], max(abs(result.values[k]), 1e-15)))
+        return f"{text}: {result.values[k].real:.3g} 1/s is known to {decade(known)} only"
     if verdict in ("neutral", "drifts"):
-        zeros, pairs = len(found.zeros), int((found.values[found.imaginary].imag > 0).sum())
+        zeros, pairs = len(result.zeros), int((result.values[result.imaginary].imag > 0).sum())
         parts = [f"{zeros} zero" if zeros else "", f"{pairs} undamped oscillation{'s' * (pairs != 1)}" if pairs else ""]
         return f"{text} ({', '.join(p for p in parts if p)})"
     return text

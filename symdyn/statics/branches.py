@@ -31,11 +31,11 @@ def branch(motion: PeriodicMotion, name: Any, least: Any, most: Any, step: Any, 
     if asked not in parameters:
         raise ArgumentError(f"{module.name}: a branch was to be followed over {shown(asked)}, which is no parameter; there are "
                             f"{', '.join(parameters)}")
-    place = parameters.index(asked)
+    index = parameters.index(asked)
     low, high = (number_of(value, module.name, f"{what} of the branch must be a number")
                  for value, what in ((least, "least"), (most, "most")))
-    if not low <= motion.params[place] <= high:
-        raise ArgumentError(f"{module.name}: {asked} = {motion.params[place]:g} is not between the ends {low:g} and {high:g} of "
+    if not low <= motion.params[index] <= high:
+        raise ArgumentError(f"{module.name}: {asked} = {motion.params[index]:g} is not between the ends {low:g} and {high:g} of "
                             "the "
                             "branch; begin with a motion between them")
     length = number_of(step, module.name, "the step along the branch must be a number")
@@ -45,26 +45,26 @@ def branch(motion: PeriodicMotion, name: Any, least: Any, most: Any, step: Any, 
                             f"begin with smaller {asked}")
     if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
         raise ArgumentError(f"{module.name}: a branch of {shown(n)} motions was asked for; pass a whole number from 1 on")
-    at = _Point.of(motion, place, float(np.sign(length)), None)
-    found: list[PeriodicMotion] = []
+    at = _Point.of(motion, index, float(np.sign(length)), None)
+    result: list[PeriodicMotion] = []
     length = abs(length)
     longest = length
-    while len(found) < n:
+    while len(result) < n:
         reached = at.along(length)
         if reached is None:
             length *= SHORTER
             if length < SHORTEST * longest:
-                raise NoEquilibrium(f"{module.name}: the branch of periodic motions over {asked} is lost after {len(found)} "
-                                    f"motions, at {asked} = {at.motion.params[place]:.6g}; it may end there, or branch off; the "
-                                    "error has these motions as found", found)
+                raise NoEquilibrium(f"{module.name}: the branch of periodic motions over {asked} is lost after {len(result)} "
+                                    f"motions, at {asked} = {at.motion.params[index]:.6g}; it may end there, or branch off; the "
+                                    "error has these motions as found", result)
             continue
         there, iterations = reached
-        if not low <= there.params[place] <= high:
+        if not low <= there.params[index] <= high:
             break
-        found.append(there)
-        at = _Point.of(there, place, 0.0, at.tangent)
+        result.append(there)
+        at = _Point.of(there, index, 0.0, at.tangent)
         length = min(longest, LONGER * length) if iterations <= QUICK else length
-    return found
+    return result
 
 
 @dataclass(frozen=True)
@@ -79,17 +79,17 @@ class _Point:
     sizes: np.ndarray
 
     @classmethod
-    def of(cls, motion: PeriodicMotion, place: int, way: float, before: np.ndarray | None) -> _Point:
+    def of(cls, motion: PeriodicMotion, index: int, way: float, before: np.ndarray | None) -> _Point:
         """way: the sign of the parameter's change; 0: on as before, by a tangent."""
-        shot, slide = _shot(motion, place, motion.x, motion.period, motion.params[place])
-        p = motion.params[place]
+        shot, slide = _shot(motion, index, motion.x, motion.period, motion.params[index])
+        p = motion.params[index]
         sizes = np.append(np.full(shot.matrix.shape[1] - 1, max(float(np.abs(motion.x).max()), 1e-3)), abs(p) or 1.0)
         if motion.free_period:
             sizes[-2] = motion.period
         tangent = np.linalg.svd(shot.matrix * sizes)[2][-1]
         full = np.concatenate([shot.basis @ (tangent * sizes)[:shot.basis.shape[1]], tangent[shot.basis.shape[1]:]])
         turned = tangent[-1] * way if before is None else full @ before
-        return cls(motion, place, full if turned >= 0 else -full, shot.basis, slide, sizes)
+        return cls(motion, index, full if turned >= 0 else -full, shot.basis, slide, sizes)
 
     def along(self, length: float) -> tuple[PeriodicMotion, int] | None:
         """The motion a step further on the branch, and Newton's steps; None if it is not found."""
@@ -130,11 +130,11 @@ class _Linear:
     matrix: np.ndarray
 
 
-def _shot(motion: PeriodicMotion, place: int, x: np.ndarray, period: float, p: float) -> tuple[_Linear, np.ndarray]:
+def _shot(motion: PeriodicMotion, index: int, x: np.ndarray, period: float, p: float) -> tuple[_Linear, np.ndarray]:
     """A motion from a start with its derivatives, and how the start moves with the parameter on the constraints, (n_x,)."""
-    problem = _with(motion, place, p)
+    problem = _with(motion, index, p)
     shot = problem.shot(x, period)
-    by = problem.solution(x, period, 2, [motion.module.metadata.parameters[place]]).sensitivity.matrix[:, :, 0]
+    by = problem.solution(x, period, 2, [motion.module.metadata.parameters[index]]).sensitivity.matrix[:, :, 0]
     by_p = problem.back @ by[-1] - problem.keeps * by[0]
     columns = [shot.moved - shot.basis, *([shot.late[:, None]] if motion.free_period else []), by_p[:, None]]
     matrix = np.hstack(columns)
@@ -144,8 +144,8 @@ def _shot(motion: PeriodicMotion, place: int, x: np.ndarray, period: float, p: f
     return _Linear(shot.gap, shot.end, shot.basis, matrix), by[0]
 
 
-def _with(motion: PeriodicMotion, place: int, value: float) -> Any:
+def _with(motion: PeriodicMotion, index: int, value: float) -> Any:
     """The problem of the motion with another value of the parameter."""
     p = motion.params.copy()
-    p[place] = value
+    p[index] = value
     return replace(motion._problem, p=p)

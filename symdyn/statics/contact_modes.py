@@ -36,8 +36,8 @@ def asked_modes(module: Module, given: Any) -> dict[str, Any]:
     records, owner = module.metadata.contacts, module.name
     if not isinstance(given, Mapping):
         raise ArgumentError(f"{owner}: contacts is {shown(given)}; pass a mapping such as {{'heel': 'sticking'}}")
-    found: dict[str, Any] = {record.name: OPEN for record in records}
-    known = list(dict.fromkeys([*found, *[record.contact for record in records]]))
+    result: dict[str, Any] = {record.name: OPEN for record in records}
+    known = list(dict.fromkeys([*result, *[record.contact for record in records]]))
     for name, mode in given.items():
         own = [record for record in records if name in (record.name, record.contact)]
         if not own:
@@ -48,14 +48,14 @@ def asked_modes(module: Module, given: Any) -> dict[str, Any]:
         if kind not in MODES:
             raise ArgumentError(f"{owner}: the mode of contact {name} is {shown(mode)}; there are 'open', 'sticking', 'sliding', "
                                 "and ('sliding', direction)")
-        found.update({record.name: mode for record in own})
-    return found
+        result.update({record.name: mode for record in own})
+    return result
 
 
 def with_modes(module: Module, given: Any, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """The parameters with the modes of contacts set. Raises ArgumentError for slips without direction, and gaps that are open."""
     modes = asked_modes(module, given)
-    place = {name: k for k, name in enumerate(module.metadata.parameters)}
+    index = {name: k for k, name in enumerate(module.metadata.parameters)}
     at = numbers(module, t, x, p, inputs)
     p = p.copy()
     for k, (record, rows) in enumerate(zip(module.metadata.contacts, rows_of(module.metadata.contacts), strict=True)):
@@ -66,17 +66,17 @@ def with_modes(module: Module, given: Any, t: float, x: np.ndarray, p: np.ndarra
                                 "state in which it touches, or 'open'")
         if kind == STICKING and not record.sticking:
             kind = SLIDING  # without friction
-        p[place[record.closed]] = kind != OPEN
+        p[index[record.closed]] = kind != OPEN
         if not record.sticking:
             continue
-        p[place[record.sticking]] = kind == STICKING
+        p[index[record.sticking]] = kind == STICKING
         slip = at.slip[list(rows[1:])]
         direction = _direction(module, record, mode, slip) if kind == SLIDING else np.zeros(len(slip))
         for name, value in zip(record.sliding, direction, strict=True):
-            p[place[name]] = value
+            p[index[name]] = value
     held = held_places(module, p)
     D = at.D[np.ix_(held, held)]
-    p[place[SHARED]] = SOFTNESS if len(held) and np.linalg.matrix_rank(D, DEPENDENT * np.abs(D).max()) < len(held) else 0.0
+    p[index[SHARED]] = SOFTNESS if len(held) and np.linalg.matrix_rank(D, DEPENDENT * np.abs(D).max()) < len(held) else 0.0
     return p
 
 
@@ -97,12 +97,12 @@ def _direction(module: Module, record: ContactRecord, mode: Any, slip: np.ndarra
 
 def held_places(module: Module, p: np.ndarray) -> list[int]:
     """Rows of contacts that hold in the mode that parameters say."""
-    place = {name: k for k, name in enumerate(module.metadata.parameters)}
-    found = []
+    index = {name: k for k, name in enumerate(module.metadata.parameters)}
+    result = []
     for record, rows in zip(module.metadata.contacts, rows_of(module.metadata.contacts), strict=True):
-        if record.closed in place and p[place[record.closed]]:
-            found += [rows[0], *(rows[1:] if record.sticking and p[place[record.sticking]] else ())]
-    return found
+        if record.closed in index and p[index[record.closed]]:
+            result += [rows[0], *(rows[1:] if record.sticking and p[index[record.sticking]] else ())]
+    return result
 
 
 def demand_modes(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> None:
@@ -148,12 +148,12 @@ def contact_rows(point: OperatingPoint) -> Rows | None:
     of_open = module.jacobian(point.t, point.x, parted, point.inputs, ["x", "inputs"])
     slips = [np.asarray(part)[4 * k:4 * k + n][held] for part in (by.x, by.inputs)]
     J = slips[0][:, n_q:n_q + n_u]
-    found = []
+    result = []
     for part, parted_rates in ((np.asarray(by.x), np.asarray(of_open.x)), (np.asarray(by.inputs), np.asarray(of_open.inputs))):
         first = 4 * k + 3 * n
         free = part[4 * k + n:4 * k + 2 * n]
         D = part[first:first + n * n].reshape(n, n, -1)
         B = part[first + n * n:first + n * n + n_u * n].reshape(n_u, n, -1)
         turned = np.einsum("ijx,j->ix", D, at.force)[held] - J @ np.einsum("ujx,j->ux", B, at.force)
-        found.append(free[held] + turned - J @ parted_rates[n_q:n_q + n_u])
-    return Rows(J, slips[0], found[0], slips[1], found[1])
+        result.append(free[held] + turned - J @ parted_rates[n_q:n_q + n_u])
+    return Rows(J, slips[0], result[0], slips[1], result[1])

@@ -338,12 +338,12 @@ def _with_forces(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs:
     slack = forces.slack()
     if slack < -WITHIN:
         raise NoEquilibrium(f"{module.name}: contacts would have to {forces.fault()}; this position does not stay at rest")
-    found = {}
+    result = {}
     for record, rows in zip(module.metadata.contacts, rows_of(module.metadata.contacts), strict=True):
         mode = OPEN if rows[0] not in forces.held else STICKING if set(rows[1:]) & set(forces.held) else SLIDING
         least, most = (forces.extreme(rows[0], side) for side in (1.0, -1.0))
-        found[record.name] = Carried(mode, forces.best[list(rows)], least, most)
-    return Rest(module, t, x, p, inputs, found, forces.free.shape[1] == 0, slack)
+        result[record.name] = Carried(mode, forces.best[list(rows)], least, most)
+    return Rest(module, t, x, p, inputs, result, forces.free.shape[1] == 0, slack)
 
 
 class _Forces:
@@ -402,16 +402,16 @@ class _Forces:
 
     def fault(self) -> str:
         """Which contacts are beyond their cones."""
-        found = []
+        result = []
         for k, own in enumerate(self.rows):
             if own[0] in self.held:
                 normal, friction = self.best[own[0]], float(np.linalg.norm(self.best[list(own[1:])]))
                 name = self.module.metadata.contacts[k].name
                 if normal < -WITHIN * self.size:
-                    found.append(f"pull ({name} by {-normal:.6g} N)")
+                    result.append(f"pull ({name} by {-normal:.6g} N)")
                 elif friction > self.static[k] * normal + WITHIN * self.size:
-                    found.append(f"rub more than they can ({name}: {friction:.6g} N of {self.static[k] * normal:.6g} N)")
-        return " and ".join(found) or "pull or rub more than they can"
+                    result.append(f"rub more than they can ({name}: {friction:.6g} N of {self.static[k] * normal:.6g} N)")
+        return " and ".join(result) or "pull or rub more than they can"
 
     def _solved(self, cost: np.ndarray, of_slack: float) -> tuple[Any, float]:
         """y of least cost with all planes (and the largest slack where of_slack is -1), and the slack; takes best as far as the

@@ -149,8 +149,8 @@ class Course:
         weights = np.where((k[half] == 0) | (k[half] == n / 2), 1.0, 2.0)
         angles = 2 * np.pi / self.period * np.outer(times, k[half])
         coefficients = self.harmonics[half].reshape(int(half.sum()), -1)
-        found = (weights * np.cos(angles)) @ coefficients.real - (weights * np.sin(angles)) @ coefficients.imag
-        return np.asarray(found.reshape(len(times), *shape))
+        result = (weights * np.cos(angles)) @ coefficients.real - (weights * np.sin(angles)) @ coefficients.imag
+        return np.asarray(result.reshape(len(times), *shape))
 
 
 def scales(course: Course) -> np.ndarray:
@@ -171,7 +171,7 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
     precise  relative error of the motion
     """
     point = start.point
-    found: Course | None = None
+    result: Course | None = None
     motion = _motion(point, start, period, precise)
     partition: tuple[list[int], list[int]] | None = None
     points: list[OperatingPoint] = []
@@ -188,26 +188,26 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
                 raise
             partition = None
             nodes = _nodes(start, points, None, ())
-        found = Course(period, nodes, motion(period), closed, partition is None)
-        if found.tail <= SMOOTH:
+        result = Course(period, nodes, motion(period), closed, partition is None)
+        if result.tail <= SMOOTH:
             break
-    assert found is not None
+    assert result is not None
     if closed:
-        scale = scales(found)
+        scale = scales(result)
         into = scale / scale[:, None]
-        gap = np.abs(found.after - found.A[0]) * into
-        if gap.max(initial=0.0) > REPEATS * (np.abs(found.A) * into).max(initial=0.0):
+        gap = np.abs(result.after - result.A[0]) * into
+        if gap.max(initial=0.0) > REPEATS * (np.abs(result.A) * into).max(initial=0.0):
             i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
             raise ArgumentError(f"{point.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
-                                f"[{i}, {j}] of A is {found.A[0][i, j]:.6g} at the start and {found.after[i, j]:.6g} then; "
+                                f"[{i}, {j}] of A is {result.A[0][i, j]:.6g} at the start and {result.after[i, j]:.6g} then; "
                                 "pass the period of the motion as period=...")
     if closed:
-        _demand_repetition(found)
-    if closed and found.tail > RESOLVED:
+        _demand_repetition(result)
+    if closed and result.tail > RESOLVED:
         raise ArgumentError(f"{point.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
                             f"period "
                             "do not resolve them; loads with kinks (tables, Piecewise) have no monodromy matrix of this kind")
-    return found
+    return result
 
 
 def _nodes(start: Manifold, points: Sequence[OperatingPoint], partition: tuple[list[int], list[int]] | None,
@@ -231,23 +231,23 @@ def _motion(point: OperatingPoint, manifold: Manifold, period: float, precise: f
         if not selection.held:
             return np.asarray(module.rhs(point.t + t, x, point.p, point.inputs))
         here = rest(module, point.t + t, x, point.p, point.inputs)
-        found = np.zeros(len(x))
+        result = np.zeros(len(x))
         if held is None:
-            found[n_q:n_q + n_u] = in_motion(here, selection).ud
+            result[n_q:n_q + n_u] = in_motion(here, selection).ud
         else:  # forces along what is held are taken up, and it goes on as it moves
-            found[n_q:][free] = np.linalg.solve(here.M[np.ix_(free, free)], -here.forces[free])
-        found[:n_q] = here.balance[here.parts["q_dot"]]
-        found[states] = here.rates_z[manifold.states]
-        return found
+            result[n_q:][free] = np.linalg.solve(here.M[np.ix_(free, free)], -here.forces[free])
+        result[:n_q] = here.balance[here.parts["q_dot"]]
+        result[states] = here.rates_z[manifold.states]
+        return result
 
     size = np.maximum(np.abs(point.x), 1.0)
-    found = scipy.integrate.solve_ivp(rates, (0.0, period), point.x, "DOP853", dense_output=True, rtol=precise,
-                                      atol=precise * size)
-    if not found.success:
-        raise NoEquilibrium(f"{module.name}: the motion cannot be followed over its period: {found.message}")
+    result = scipy.integrate.solve_ivp(rates, (0.0, period), point.x, "DOP853", dense_output=True, rtol=precise,
+                                       atol=precise * size)
+    if not result.success:
+        raise NoEquilibrium(f"{module.name}: the motion cannot be followed over its period: {result.message}")
 
     def at(t: float) -> OperatingPoint:
-        return in_motion(point.at(t=point.t + t, x=found.sol(t) if t else point.x), selection)
+        return in_motion(point.at(t=point.t + t, x=result.sol(t) if t else point.x), selection)
 
     return at
 
@@ -256,14 +256,14 @@ def _held_rates(point: OperatingPoint, held: Sequence[str]) -> list[int] | None:
     """Indices of the speeds that are held, if each of them is the rate of a coordinate and nothing else is constrained."""
     metadata = point.module.metadata
     labels = coordinate_names(metadata)
-    found = []
+    result = []
     for name in held:
         indices = [k for k, (label, u) in enumerate(zip(labels, metadata.u, strict=True)) if name in (label, u)
                    and label in metadata.q]
         if point.sizes[3] or not (indices or name in metadata.z):
             return None
-        found += indices
-    return found
+        result += indices
+    return result
 
 
 def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], np.ndarray],
@@ -389,9 +389,9 @@ def _cyclic(course: Course) -> np.ndarray:
     T = course.widened(np.eye(len(scale)))
     wide = np.abs(T) @ scale if course.bundled else scale
     columns = np.abs((course.A @ T) / wide[:, None] * scale).max(axis=0).max(axis=0)
-    found = columns <= NOTHING * columns.max(initial=0.0)
-    found[course.first.n_d:] = False
-    return np.asarray(found)
+    result = columns <= NOTHING * columns.max(initial=0.0)
+    result[course.first.n_d:] = False
+    return np.asarray(result)
 
 
 def _left_open(course: Course) -> np.ndarray:

@@ -564,7 +564,7 @@ def _warn_of_validity(search: Search) -> None:
     point, name = trial.point, trial.point.module.name
     if point.module.metadata.watches:
         warn(point.module, point.evaluate(WATCHES), "in equilibrium", 5)
-    if "t" not in point.module.unit("balance").metadata.arguments.get("balance", ()):
+    if "t" not in point.module.library("balance").metadata.arguments.get("balance", ()):
         return
     labels, allowed = coordinate_names(point.module.metadata), search.allowed(trial)
     try:

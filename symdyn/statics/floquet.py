@@ -92,16 +92,16 @@ def _gauss(s: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return c, a, weights / 2
 
 
-def multipliers(found: Fundamental) -> Spectrum:
+def multipliers(result: Fundamental) -> Spectrum:
     """The eigenvalues of the monodromy matrix, judged against the unit circle."""
-    return spectrum(found.monodromy, Unknown.of(found.E), DISCRETE)
+    return spectrum(result.monodromy, Unknown.of(result.E), DISCRETE)
 
 
-def exponents(found: Spectrum, period: float) -> np.ndarray:
+def exponents(result: Spectrum, period: float) -> np.ndarray:
     """log(mu) / T, imaginary parts up to pi / T, (m,); of what is neutral without rounding: no real part; zero for mu = 1."""
-    values = np.where(found.values == 0, 1e-300, found.values)
+    values = np.where(result.values == 0, 1e-300, result.values)
     logs = np.log(values.astype(complex)) / period
-    logs[found.zeros] = 0.0
-    settled = [k for k in found.imaginary if k not in set(found.undecided.tolist())]
+    logs[result.zeros] = 0.0
+    settled = [k for k in result.imaginary if k not in set(result.undecided.tolist())]
     logs[settled] = 1j * logs[settled].imag
     return np.asarray(logs)

@@ -83,17 +83,17 @@ def _blocks(course: Course) -> list[tuple[slice, ...]]:
     n_d, n_s, n_z = course.sizes
     eta, zeta, z = slice(0, n_d), slice(n_d, n_d + n_s), slice(n_d + n_s, n_d + n_s + n_z)
     alike = course.bundled or course.first.Z_u is course.first.Z_v
-    found: list[tuple[slice, ...]] = [(eta, zeta)] if alike else [(eta,), (zeta,)]
-    return [*found, *([(z,)] if n_z else [])]
+    result: list[tuple[slice, ...]] = [(eta, zeta)] if alike else [(eta,), (zeta,)]
+    return [*result, *([(z,)] if n_z else [])]
 
 
 def _patterns(blocks: list[tuple[slice, ...]], m: int) -> list[list[tuple[int, int]]]:
     """Entries of S that are one unknown."""
-    found = []
+    result = []
     for parts in blocks:
         n = parts[0].stop - parts[0].start
-        found += [[(part.start + i, part.start + j) for part in parts] for i in range(n) for j in range(n)]
-    return found
+        result += [[(part.start + i, part.start + j) for part in parts] for i in range(n) for j in range(n)]
+    return result
 
 
 def _commutator(A: np.ndarray, patterns: list[list[tuple[int, int]]]) -> np.ndarray:
@@ -136,7 +136,7 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
     rates = np.real(np.fft.ifft((2j * np.pi / course.period * k)[:, None, None] * np.fft.fft(fields, axis=0), axis=0))
     columns = [[(i, j) for i, j in entries if i < n_d and j < n_d] for entries in patterns]
     still = _rows_that_do_not_spin(course.first)
-    found = [s]
+    result = [s]
     for rows in (still, ~still):
         if not rows.any() or not loose.shape[1]:
             continue
@@ -148,15 +148,15 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
                     K[p, :, j] += field[:, i]
             K = K.reshape(len(patterns), -1).T
             systems.append(K @ loose)
-            right.append(-rate.ravel() - K @ found[-1])
+            right.append(-rate.ravel() - K @ result[-1])
         Q, R = np.linalg.qr(np.vstack(systems))
         U, values, Vt = np.linalg.svd(R)
         kept = values > 1e-7 * values.max(initial=1e-300)
         count = int(kept.sum())
         change = Vt[:count].T @ ((U[:, :count].T @ (Q.T @ np.concatenate(right))) / values[:count])
-        found.append(found[-1] + loose @ change)
+        result.append(result[-1] + loose @ change)
         loose = loose @ Vt[count:].T
-    return found[::-1]
+    return result[::-1]
 
 
 def _rows_that_do_not_spin(manifold: Manifold) -> np.ndarray:
@@ -235,13 +235,13 @@ class Observer:
     def _turned(self, field: np.ndarray, angle: float) -> np.ndarray:
         """Displacements (rows of J, n_d) with their vectors turned about the axis."""
         R = scipy.linalg.expm(angle * np.cross(self.axis, np.eye(3)).T)
-        found = field.copy()
+        result = field.copy()
         for start in range(0, len(field), self.per_body):
             if self.per_body == 3:
-                found[start:start + 2] = R[:2, :2] @ field[start:start + 2]
+                result[start:start + 2] = R[:2, :2] @ field[start:start + 2]
             else:
-                found[start:start + 3], found[start + 3:start + 6] = R @ field[start:start + 3], R @ field[start + 3:start + 6]
-        return found
+                result[start:start + 3], result[start + 3:start + 6] = R @ field[start:start + 3], R @ field[start + 3:start + 6]
+        return result
 
     def in_fixed_axes(self, turned: np.ndarray) -> bool:
         """Whether variables w with displacements e^(st) w, s at the nodes (n, n_d, n_d), are those of the fixed frame: what the

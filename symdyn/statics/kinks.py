@@ -52,12 +52,12 @@ def _breaks(point: OperatingPoint, k: int) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", EvaluationWarning)
-            found = point.module.evaluate("balance", point.t, moved[:, :n_x], point.p, moved[:, n_x:], ud)
+            result = point.module.evaluate("balance", point.t, moved[:, :n_x], point.p, moved[:, n_x:], ud)
     except EvaluationError:
         return False
-    middle = found[0]
-    sides = found[1:].reshape(len(STEPS), 2, len(SPREAD), -1)
-    rounding = np.ptp(sides, axis=2).max(axis=(0, 1)) + np.finfo(float).eps * np.abs(found).max(axis=0)
+    middle = result[0]
+    sides = result[1:].reshape(len(STEPS), 2, len(SPREAD), -1)
+    rounding = np.ptp(sides, axis=2).max(axis=(0, 1)) + np.finfo(float).eps * np.abs(result).max(axis=0)
     widths = steps.reshape(len(STEPS), 2, len(SPREAD))[:, 0, 0, None]
     bent, across = sides[:, 0, 0] + sides[:, 1, 0] - 2 * middle, sides[:, 0, 0] - sides[:, 1, 0]
     alike = _constant(across), _constant(bent / widths)
@@ -69,16 +69,16 @@ def _breaks(point: OperatingPoint, k: int) -> bool:
 def _noise(point: OperatingPoint, k: int, step: float) -> np.ndarray:
     """What data that differ in their last digit make of the balance, on both sides of the value of entry k."""
     stream = np.random.default_rng(0)
-    found = []
+    result = []
     for way in (step, -step):
         moved = np.concatenate([point.x, point.inputs])
         moved[k] += way
         side = point.at(x=moved[:len(point.x)], inputs=moved[len(point.x):])
-        found.append(np.ptp([rounded(side, stream).balance for _ in range(SAMPLES)], axis=0))
-    return np.max(found, axis=0)  # type: ignore[no-any-return]
+        result.append(np.ptp([rounded(side, stream).balance for _ in range(SAMPLES)], axis=0))
+    return np.max(result, axis=0)  # type: ignore[no-any-return]
 
 
 def _constant(rows: np.ndarray) -> np.ndarray:
     """Which columns are the same in all rows, but for a part."""
-    found: np.ndarray = np.ptp(rows, axis=0) <= SAME * np.abs(rows).max(axis=0)
-    return found
+    result: np.ndarray = np.ptp(rows, axis=0) <= SAME * np.abs(rows).max(axis=0)
+    return result

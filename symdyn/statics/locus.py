@@ -112,9 +112,9 @@ def root_locus(module: Module, parameter: Any, values: Any, at: Any = None, para
         if at is not None:
             linear.append(module.linearize(at, both, **options))
             continue
-        found = module.equilibrium(start=start, params=both, **options)
-        linear.append(module.linearize(found))
-        start = found.x
+        result = module.equilibrium(start=start, params=both, **options)
+        linear.append(module.linearize(result))
+        start = result.x
     sets: list[Modes] = [each.modes() for each in linear]
     tracks = follow(sets, [each.inertia for each in linear], numbers)
     eigenvalues = np.full((len(numbers), len(tracks)), complex(np.nan, np.nan))

@@ -238,12 +238,12 @@ class Manifold:
         """The u' (n_u, k) with rows u' = -right whose independent ones are zero; left out: S and the speeds."""
         rows = self.S if rows is None else rows
         n_u = self.point.sizes[1]
-        found = np.zeros((n_u, right.shape[1]))
+        result = np.zeros((n_u, right.shape[1]))
         dependent = [k for k in range(n_u) if k not in set(self.speeds if independent is None else independent)]
         if right.any() and dependent:
             columns = natural_scales(self.point)[dependent]
-            found[dependent] = -columns[:, None] * np.linalg.lstsq(rows[:, dependent] * columns, right, rcond=1e-12)[0]
-        return found
+            result[dependent] = -columns[:, None] * np.linalg.lstsq(rows[:, dependent] * columns, right, rcond=1e-12)[0]
+        return result
 
     def _bent_reactions(self) -> np.ndarray:
         """Change of the forces that hold coordinates because their direction turns, by v, (n_u, n_u).
@@ -326,9 +326,9 @@ class Manifold:
         return self.state_matrices()
 
 
-def _left(rows: np.ndarray, found: np.ndarray, asked: np.ndarray, *products: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def _left(rows: np.ndarray, result: np.ndarray, asked: np.ndarray, *products: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Which columns of rows @ found + asked + the products are not zero, by the sizes of their terms, (n_in,) of bool."""
-    left, size = rows @ found + asked, np.abs(asked)
+    left, size = rows @ result + asked, np.abs(asked)
     for factor, other in products:
         left, size = left + factor @ other, size + np.abs(factor) @ np.abs(other)
     worst: np.ndarray = np.abs(left).max(axis=0, initial=0.0) > FOLLOWED * size.max(axis=0, initial=0.0)
@@ -364,14 +364,14 @@ def common_partition(start: Manifold, points: Sequence[OperatingPoint]) -> tuple
 def _with_partition(manifold: Manifold, partition: tuple[list[int], list[int]]) -> tuple[np.ndarray, np.ndarray]:
     """Z_v and Z_u with other independent ones, lengths by the natural length."""
     scales = natural_scales(manifold.point)
-    found = []
+    result = []
     for Z, independent in zip((manifold.Z_v, manifold.Z_u), partition, strict=True):
         block = Z[independent]
         if block.shape[0] != block.shape[1] or (len(block) and np.linalg.cond(block / scales[independent][:, None]) > CONDITION):
             raise ArgumentError("")
         other = Z @ np.linalg.inv(block) if len(block) else Z
-        found.append(other / scales[:, None] * scales[independent])
-    return found[0], found[1]
+        result.append(other / scales[:, None] * scales[independent])
+    return result[0], result[1]
 
 
 def _factorized(M: np.ndarray, name: str) -> Callable[[np.ndarray], np.ndarray]:
@@ -422,12 +422,12 @@ def _basis(point: OperatingPoint, rows: np.ndarray, independent: Sequence[int] |
                             "or leave the choice open")
     if not Z.shape[1]:
         return Z, []
-    found = Z @ np.linalg.inv(block)
+    result = Z @ np.linalg.inv(block)
     # What rounding leaves of a zero would couple what is independent by structure, and count as not known in every matrix.
-    sizes = np.abs(found / scales[:, None] * scales[list(independent)])
-    found[sizes <= DUST * sizes.max()] = 0.0
-    found[list(independent)] = np.eye(len(block))
-    return found, list(independent)
+    sizes = np.abs(result / scales[:, None] * scales[list(independent)])
+    result[sizes <= DUST * sizes.max()] = 0.0
+    result[list(independent)] = np.eye(len(block))
+    return result, list(independent)
 
 
 def natural_scales(point: OperatingPoint) -> np.ndarray:
@@ -473,10 +473,10 @@ def in_motion(point: OperatingPoint, selection: Selection) -> OperatingPoint:
     scale = 1 / np.sqrt(np.maximum(masses, MASSLESS * masses.max(initial=1e-300)))
     A = np.vstack(rows) * scale
     KKT = np.block([[point.M * np.outer(scale, scale), A.T], [A, np.zeros((len(A), len(A)))]])
-    found = np.linalg.lstsq(KKT, np.concatenate([-point.forces * scale, *right]), rcond=1e-12)[0]
-    ud = scale * found[:n_u]
+    result = np.linalg.lstsq(KKT, np.concatenate([-point.forces * scale, *right]), rcond=1e-12)[0]
+    ud = scale * result[:n_u]
     # Rest is rest: rounding is no motion.
     sizes = natural_scales(point)
     level = max(acceleration_size(point, np.abs(point.forces)), float(np.abs(np.concatenate(right)).max(initial=0.0)))
     ud = np.where(np.abs(ud / sizes) <= 1e-13 * level, 0.0, ud)
-    return point.at(ud=ud, lam=found[n_u:n_u + n_c] * point.scale)
+    return point.at(ud=ud, lam=result[n_u:n_u + n_c] * point.scale)

@@ -247,7 +247,7 @@ def modes_of(spectrum: Spectrum, shapes: Shapes, title: str, notes: Sequence[str
     values = settled_values(spectrum) if values is None else values
     right = _parted(values, spectrum.right, spectrum.left, shapes)
     undecided = set(spectrum.undecided.tolist())
-    found = []
+    result = []
     for k in ordered(values).tolist():
         value = complex(values[k])
         if value.imag < 0:
@@ -255,11 +255,11 @@ def modes_of(spectrum: Spectrum, shapes: Shapes, title: str, notes: Sequence[str
         kind = "zero" if k in set(spectrum.zeros.tolist()) else "not decided" if k in undecided else \
             "unstable" if spectrum.signs[k] > 0 else "oscillation" if value.imag else "real"
         mode = _mode(shapes, value, right[:, k], spectrum.left[:, k], kind)
-        found.append(replace(mode, harmonics=seen[k].harmonics, whirl=seen[k].whirl, whirls=seen[k].whirls) if seen else mode)
-    found = _paired(found)
-    names = [m.name for m in found]
+        result.append(replace(mode, harmonics=seen[k].harmonics, whirl=seen[k].whirl, whirls=seen[k].whirls) if seen else mode)
+    result = _paired(result)
+    names = [m.name for m in result]
     return Modes(title, [m if names.count(m.name) == 1 else replace(m, name=f"{m.name} ({names[:k + 1].count(m.name)})")
-                         for k, m in enumerate(found)], notes)
+                         for k, m in enumerate(result)], notes)
 
 
 def sense_of(whirl: float, whirls: tuple[float, float]) -> str:
@@ -296,7 +296,7 @@ def settled_values(spectrum: Spectrum) -> np.ndarray:
 
 def _parted(values: np.ndarray, right: np.ndarray, left: np.ndarray, shapes: Shapes) -> np.ndarray:
     """Eigenvectors of equal eigenvalues made different: each moves one coordinate that the others leave alone."""
-    found = right.copy()
+    result = right.copy()
     scale = np.abs(values)
     done: set[int] = set()
     for k in range(len(values)):
@@ -309,8 +309,8 @@ def _parted(values: np.ndarray, right: np.ndarray, left: np.ndarray, shapes: Sha
         if np.linalg.matrix_rank(rows, tol=1e-6 * np.abs(rows).max(initial=0.0)) < len(group):
             continue
         pivots = scipy.linalg.qr(rows.T, mode="r", pivoting=True)[1][:len(group)]
-        found[:, group] = right[:, group] @ np.linalg.inv(right[np.ix_(pivots, group)])
-    return found
+        result[:, group] = right[:, group] @ np.linalg.inv(right[np.ix_(pivots, group)])
+    return result
 
 
 def _paired(modes: list[Mode]) -> list[Mode]:

@@ -39,13 +39,13 @@ class Noise:
 def noise(manifold: Manifold) -> Noise:
     """The bounds about one state."""
     mine = _matrices(manifold)
-    found = [np.zeros_like(each) for each in mine]
+    result = [np.zeros_like(each) for each in mine]
     stream = np.random.default_rng(7)
     for _ in range(SAMPLES):
         point = in_motion(rounded(manifold.point, stream), manifold.selection)
         other = _matrices(Manifold(point, manifold.selection, partition=manifold.partition))
-        found = [np.maximum(most, np.abs(b - a)) for most, a, b in zip(found, mine, other, strict=True)]
-    A, M, C, K, K_z = (SAFETY * most + ENTRIES * EPSILON * np.abs(a) for most, a in zip(found, mine, strict=True))
+        result = [np.maximum(most, np.abs(b - a)) for most, a, b in zip(result, mine, other, strict=True)]
+    A, M, C, K, K_z = (SAFETY * most + ENTRIES * EPSILON * np.abs(a) for most, a in zip(result, mine, strict=True))
     of_K, of_C, of_z = _of_sums(manifold)
     C, K, K_z = C + of_C, K + of_K, K_z + of_z
     ends = np.cumsum([0, manifold.n_d, manifold.n_s, len(manifold.states)])
@@ -79,7 +79,7 @@ def _floor(manifold: Manifold, rounding: np.ndarray) -> np.ndarray:
     scaled = A * sizes / sizes[:, None]
     rates = np.zeros(len(A), dtype=bool)
     rates[n_d:n_d + n_s] = True
-    found = np.zeros_like(A)
+    result = np.zeros_like(A)
     _, parts = scipy.sparse.csgraph.connected_components(rounding < A, directed=False)
     for part in np.unique(parts):
         inner = parts == part
@@ -89,8 +89,8 @@ def _floor(manifold: Manifold, rounding: np.ndarray) -> np.ndarray:
         units = sizes * np.where(rates, clock, 1.0)
         among = np.ix_(inner, inner)
         largest = float((A * units / units[:, None])[among].max(initial=0.0))
-        found[among] = (FLOOR * EPSILON * largest * units[:, None] / units)[among]
-    return np.asarray(np.where(A > 0, found, 0.0))
+        result[among] = (FLOOR * EPSILON * largest * units[:, None] / units)[among]
+    return np.asarray(np.where(A > 0, result, 0.0))
 
 
 def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -110,23 +110,23 @@ def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     moved = (full_v @ Z_v + full_u @ W, full_u @ Z_u, full_z + full_u @ W_z)
     from_bases = (full_v @ of_v + full_u @ of_W, full_u @ of_u, full_u @ of_W_z)
     from_terms = (F_v @ Z_v + F_u @ W, F_u @ Z_u, F_z + F_u @ W_z)
-    found = [inner @ (terms + bases + asked) + of_u.T @ (whole + M @ np.abs(each))
-             for terms, bases, asked, whole, each in zip(from_terms, from_bases, demanded, moved, manifold.demanded, strict=True)]
-    return found[0], found[1], found[2]
+    parts = zip(from_terms, from_bases, demanded, moved, manifold.demanded, strict=True)
+    result = [inner @ (terms + bases + asked) + of_u.T @ (whole + M @ np.abs(each)) for terms, bases, asked, whole, each in parts]
+    return result[0], result[1], result[2]
 
 
 def _of_bases(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rounding of Z_v, Z_u, W and W_z: dependent changes are solved for, with errors of the size of the largest of them."""
     scales = natural_scales(manifold.point)
-    found = []
+    result = []
     for values, independent in ((manifold.Z_v, manifold.displacements), (manifold.Z_u, manifold.speeds),
                                 (manifold.W, manifold.speeds), (manifold.W_z, manifold.speeds)):
         error = np.outer(scales, np.abs(values / scales[:, None]).max(axis=0, initial=0.0)) * ENTRIES * EPSILON
         error[independent] = 0.0
         if (np.count_nonzero(values, axis=0) <= 1).all():  # held ones and the like: nothing was solved
             error[:] = 0.0
-        found.append(error)
-    return found[0], found[1], found[2], found[3]
+        result.append(error)
+    return result[0], result[1], result[2], result[3]
 
 
 def _entries(F: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:

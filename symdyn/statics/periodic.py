@@ -137,7 +137,7 @@ class PeriodicMotion:
             raise ArgumentError(f"{self.module.name}: a periodic motion was to be followed over {shown(asked)}, which is no "
                                 f"parameter; there are {', '.join(parameters)}")
         point = parameters.index(asked)
-        found: list[PeriodicMotion] = []
+        result: list[PeriodicMotion] = []
         motion = self
         for value in real_of(values, self.module.name, "the values of the parameter must be numbers").ravel():
             problem = motion._problem
@@ -147,11 +147,11 @@ class PeriodicMotion:
                 change = problem.derivative(motion.x, motion.period, asked) * (value - motion.params[point])
                 motion = replace(problem, p=p).solve(motion.x + change[:-1], motion.period + change[-1])
             except (NoEquilibrium, EvaluationError, ProjectionFailed, ArgumentError) as error:
-                so_far = f"; the {len(found)} motions before it are the error's found" if found else ""
+                so_far = f"; the {len(result)} motions before it are the error's found" if result else ""
                 raise NoEquilibrium(f"{error}; at {asked} = {value:g}, followed from {asked} = {motion.params[point]:g}{so_far}",
-                                    found) from None
-            found.append(motion)
-        return found
+                                    result) from None
+            result.append(motion)
+        return result
 
     def branch(self, name: Key, least: float, most: float, step: float = 0.1, n: int = 200) -> list[PeriodicMotion]:
         """The periodic motions on the branch of this one over a parameter, past folds, where the parameter turns back.
@@ -201,7 +201,7 @@ def periodic(module: Module, period: Any, q: Any = None, u: Any = None, params: 
                             f"its multipliers, are as exact as the motion; pass {LOOSEST:g} or less")
     turns = some(advance, list(metadata.x), "advance", module.name)
     begin = number_of(t, module.name, "t must be a finite time")
-    arguments = module.unit("rhs").metadata.arguments
+    arguments = module.library("rhs").metadata.arguments
     free = not any("t" in arguments.get(name, ()) for name in ("rhs", "events", "event_resets", "contacts"))
     moves = np.array([turns.get(name, 0.0) for name in metadata.x])
     left_out = _names(module, cyclic, "cyclic")
@@ -219,11 +219,11 @@ def _names(module: Module, given: Any, what: str) -> list[str]:
         return []
     if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
         raise ArgumentError(f"{module.name}: {what} is {shown(given)}; pass a list of names, such as ['{module.metadata.x[0]}']")
-    found = [name_of(one) for one in given]
-    strange = [shown(name) for name in found if name not in module.metadata.x]
+    result = [name_of(one) for one in given]
+    strange = [shown(name) for name in result if name not in module.metadata.x]
     if strange:
         raise ArgumentError(f"{module.name}: {what} names {', '.join(strange)}; there are {', '.join(module.metadata.x)}")
-    return found
+    return result
 
 
 def _exchanged(module: Module, given: Any) -> list[int]:
@@ -276,13 +276,13 @@ class _Problem:
         why = at_rest = None
         for fixed in (False, True) if self.free else (False,):
             try:
-                found = self.nearest(x, self.returns(self.start(x), period) if fixed else period, fixed)
+                result = self.nearest(x, self.returns(self.start(x), period) if fixed else period, fixed)
             except (NoEquilibrium, EvaluationError) as error:
                 why = why or error
             else:
-                if not self.rests(found, self.way(self.start(x), period)):
-                    return found
-                at_rest = at_rest or found
+                if not self.rests(result, self.way(self.start(x), period)):
+                    return result
+                at_rest = at_rest or result
         if at_rest is None:
             assert why is not None
             raise why
@@ -428,14 +428,14 @@ class _Problem:
             right = np.append(right, 0.0)
         else:
             matrix = columns[0]
-        found = np.linalg.lstsq(matrix, right, rcond=left_out)[0]
-        return np.append(small * (basis @ found[:n]), found[n] if self.free else 0.0)
+        result = np.linalg.lstsq(matrix, right, rcond=left_out)[0]
+        return np.append(small * (basis @ result[:n]), result[n] if self.free else 0.0)
 
     def derivative(self, x: np.ndarray, period: float, name: str) -> np.ndarray:
         """Derivatives of the start and of the period by a parameter, (n_x + 1,)."""
         by = self.solution(x, period, 2, [name]).sensitivity[name]
-        found = self.solved(self.shot(x, period), self.keeps * by[0] - self.back @ by[-1])
-        return found + np.append(by[0], 0.0)
+        result = self.solved(self.shot(x, period), self.keeps * by[0] - self.back @ by[-1])
+        return result + np.append(by[0], 0.0)
 
     def found(self, at: _Shot, iterations: int) -> PeriodicMotion:
         self.check_drive(at.x, at.period)

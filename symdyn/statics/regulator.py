@@ -70,10 +70,10 @@ class Regulator:
     driven: tuple[str, ...]
 
     def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
-        found: np.ndarray = self.linear.inputs.copy()
+        result: np.ndarray = self.linear.inputs.copy()
         names = self.linear.module.metadata.inputs
-        found[[names.index(n) for n in self.driven]] -= np.asarray(self.K) @ self.linear.deviation(t, x)
-        return found
+        result[[names.index(n) for n in self.driven]] -= np.asarray(self.K) @ self.linear.deviation(t, x)
+        return result
 
     def __getitem__(self, inputs: Key | tuple[Key, ...]) -> Callable[[float, np.ndarray], float | np.ndarray]:
         """The function of (t, x) of one input, which returns a number, or of a tuple of them. Raises ArgumentError for inputs
@@ -208,7 +208,7 @@ def _out_of_reach(A: np.ndarray, B: np.ndarray) -> list[tuple[complex, np.ndarra
         return []
     balanced, (factors, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     scaled = [(A, B, np.ones(n)), (balanced, B / factors[:, None], factors)]
-    matrix, rest, units = min(((a, _complement(a, b), f) for a, b, f in scaled), key=lambda found: found[1].shape[1])
+    matrix, rest, units = min(((a, _complement(a, b), f) for a, b, f in scaled), key=lambda result: result[1].shape[1])
     if not rest.shape[1]:
         return []
     values, vectors = np.linalg.eig(rest.T @ matrix.T @ rest)
@@ -235,8 +235,8 @@ def _complement(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 def _root(Q: np.ndarray) -> np.ndarray:
     """G with G G^T = Q, for a positive semidefinite matrix."""
     values, vectors = np.linalg.eigh(Q)
-    found: np.ndarray = vectors * np.sqrt(np.maximum(values, 0.0))
-    return found
+    result: np.ndarray = vectors * np.sqrt(np.maximum(values, 0.0))
+    return result
 
 
 def _mode_of(shares: np.ndarray, names: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from symdyn.errors import EvaluationError
 from symdyn.runtime.constraints import turning
 from symdyn.statics.selection import Selection
 from symdyn.statics.terms import OperatingPoint
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 # Angles change by at most this in one step, rad.
 LARGEST_TURN = 0.5

@@ -56,9 +56,9 @@ def shift(point: OperatingPoint, selection: Selection, parameter: str) -> dict[s
     rows = np.where(rows > 0, rows, 1.0)
     columns = np.abs(whole / rows[:, None]).max(axis=0, initial=0.0)
     columns = np.where(columns > 0, columns, 1.0)
-    found = np.linalg.lstsq(whole / rows[:, None] / columns, -right / rows, rcond=1e-13)[0] / columns
+    result = np.linalg.lstsq(whole / rows[:, None] / columns, -right / rows, rcond=1e-13)[0] / columns
     n = trial.directions.shape[1]
-    parts = np.split(found, np.cumsum([n, len(selection.states), len(selection.unknown)]))
+    parts = np.split(result, np.cumsum([n, len(selection.states), len(selection.unknown)]))
     changes = dict(zip(metadata.q, point.N @ trial.directions @ parts[0], strict=True))
     changes |= {metadata.z[k]: v for k, v in zip(selection.states, parts[1], strict=True)}
     changes |= dict(zip(selection.unknown, parts[2], strict=True))

@@ -17,7 +17,7 @@ from symdyn.runtime.constraints import names, scaled_jacobian, turning
 from symdyn.statics.manifold import held_indices, natural_scales
 from symdyn.statics.selection import Selection
 from symdyn.statics.terms import OperatingPoint
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 # Positions nearby are so far away, in rad or lengths of the mechanism; so many are tried.
 AWAY, TRIES = 0.03, 4

@@ -227,8 +227,8 @@ def _precise(B: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     context.prec = BITS
     try:
         matrix = acb_mat(m, m, [acb(float(v)) for v in B.ravel()])
-        found, left, right = matrix.eig(left=True, right=True, algorithm="approx")
-        values = np.array([_rounded(v) for v in found])
+        result, left, right = matrix.eig(left=True, right=True, algorithm="approx")
+        values = np.array([_rounded(v) for v in result])
         rights = np.array([_rounded(right[i, j]) for i in range(m) for j in range(m)]).reshape(m, m)
         # FLINT's rows are those of the inverse: y A = value y.
         lefts = np.array([_rounded(left[i, j]) for i in range(m) for j in range(m)]).reshape(m, m).conj().T
@@ -298,12 +298,12 @@ def _nullity(B: np.ndarray, unknown: Unknown) -> int:
 
 def _staircase(B: np.ndarray, unknown: Unknown) -> tuple[int, ...]:
     """How many Jordan blocks of the eigenvalue zero have at least 1, 2, ... members."""
-    found: list[int] = []
+    result: list[int] = []
     while len(B):
         count = _nullity(B, unknown)
         if not count:
             break
-        found.append(count)
+        result.append(count)
         inner = np.linalg.svd(B)[2][:len(B) - count].T  # complement of the null space
         B, unknown = inner.T @ B @ inner, unknown.within(inner)
-    return tuple(found)
+    return tuple(result)

@@ -189,11 +189,11 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
     motion = (course.first.point.t + np.append(course.times, course.period),
               np.array([*[node.point.x for node in course.nodes], course.last.x]))
     seen_by = Observer(course, rotating)
-    found = _periodic(course, kind, title, seen_by) if change is None else _turned(course, change, kind, title, seen_by)
+    result = _periodic(course, kind, title, seen_by) if change is None else _turned(course, change, kind, title, seen_by)
     moved = float(np.abs(course.first.point.x - point.x).max(initial=0.0))
     guess = f", from a guess of {length:.6g} s for its period" if course.period != length else ""
-    said = (found.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state{guess}", *found.evidence[1:])
-    return replace(found, motion=motion, evidence=said if moved else found.evidence)
+    said = (result.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state{guess}", *result.evidence[1:])
+    return replace(result, motion=motion, evidence=said if moved else result.evidence)
 
 
 def _constant(manifold: Manifold, kind: str, title: str) -> Stability:
@@ -207,16 +207,16 @@ def _constant(manifold: Manifold, kind: str, title: str) -> Stability:
 def _named(course: Course, kind: str, title: str, observer: Observer) -> Stability:
     """Constant equations in axes that turn."""
     analysis = Analysis(course.first)
-    found = analysis.spectrum
+    result = analysis.spectrum
 
     def shape(k: int) -> np.ndarray:
-        return np.tile(course.widened(found.right[:, k]), (len(course.nodes), 1))
+        return np.tile(course.widened(result.right[:, k]), (len(course.nodes), 1))
 
-    values, seen = _as_seen(observer, settled_values(found), shape, False)
+    values, seen = _as_seen(observer, settled_values(result), shape, False)
     evidence = (f"{kind}: accelerations vanish, here and further on",
                 "the linear equations are constant along the motion in the coordinates of the model", observer.sentence,
                 *held_note(course.first), analysis.reason())
-    return _finished(course, found, values, seen, analysis.verdict, kind, title, evidence)
+    return _finished(course, result, values, seen, analysis.verdict, kind, title, evidence)
 
 
 def _turned(course: Course, change: Change, kind: str, title: str, observer: Observer) -> Stability:
@@ -224,53 +224,53 @@ def _turned(course: Course, change: Change, kind: str, title: str, observer: Obs
     analysis = Analysis(course.first)
     T, L = (course.first.bundle[:2] if course.bundled else 2 * [np.eye(len(course.A[0]))])
     S = course.reduced(change.S)
-    found = spectrum(course.reduced(course.A[0] - change.S), analysis.noise.A.plus(np.abs(L) @ change.error @ np.abs(T)),
-                     driven=lambda right, left: analysis.driven(right, left, S, ROUNDED * 2 * np.pi / course.period))
+    result = spectrum(course.reduced(course.A[0] - change.S), analysis.noise.A.plus(np.abs(L) @ change.error @ np.abs(T)),
+                      driven=lambda right, left: analysis.driven(right, left, S, ROUNDED * 2 * np.pi / course.period))
     turned = bool(np.abs(change.S).max(initial=0.0) > 1e-9 * np.abs(course.A).max(initial=0.0))
     powers = np.array([scipy.linalg.expm(change.S * t) for t in course.times])
     n_d = course.sizes[0]
     fixed = turned and observer.in_fixed_axes(powers[:, :n_d, :n_d])
 
     def shape(k: int) -> np.ndarray:
-        return np.array([P @ course.widened(found.right[:, k]) for P in powers])
+        return np.array([P @ course.widened(result.right[:, k]) for P in powers])
 
-    values, seen = _as_seen(observer, settled_values(found), shape, fixed)
+    values, seen = _as_seen(observer, settled_values(result), shape, fixed)
     how = "after a change of variables that turns steadily" if turned else "along the motion in the coordinates of the model"
     evidence = (f"{kind}, period {course.period:.6g} s",
                 f"the linear equations are constant {how}, checked at {len(course.nodes)} positions to "
-                f"{decade(_relative(change, course))} of their size", observer.sentence, *held_note(course.first), reason(found))
-    return _finished(course, found, values, seen, found.verdict, kind, title, evidence)
+                f"{decade(_relative(change, course))} of their size", observer.sentence, *held_note(course.first), reason(result))
+    return _finished(course, result, values, seen, result.verdict, kind, title, evidence)
 
 
 def _periodic(course: Course, kind: str, title: str, observer: Observer) -> Stability:
     """Floquet theory."""
     carried = fundamental(course)
-    found = multipliers(carried)
-    logs = exponents(found, course.period)
+    result = multipliers(carried)
+    logs = exponents(result, course.period)
 
     def shape(k: int) -> np.ndarray:
         decay = np.exp(-logs[k] * course.times)
-        return np.asarray((carried.nodes @ course.widened(found.right[:, k])) * decay[:, None])
+        return np.asarray((carried.nodes @ course.widened(result.right[:, k])) * decay[:, None])
 
     values, seen = _as_seen(observer, logs, shape, False)
-    margins = np.log(np.maximum(np.abs(found.values), 1e-300)) / course.period
-    verdict = found.verdict
+    margins = np.log(np.maximum(np.abs(result.values), 1e-300)) / course.period
+    verdict = result.verdict
     decided = verdict in ("stable", "unstable")
-    text = f"{WORDS[verdict]}: the largest is {margins.max(initial=-np.inf):.6g} 1/s" if decided else reason(found)
+    text = f"{WORDS[verdict]}: the largest is {margins.max(initial=-np.inf):.6g} 1/s" if decided else reason(result)
     error = float((carried.E / np.abs(carried.monodromy).max(initial=1e-300)).max(initial=0.0))
     evidence = (f"{kind}, linear equations of period {course.period:.6g} s, which return to within {decade(_return(course))}",
                 "no change of variables that turns steadily makes them constant",
                 f"monodromy matrix from {len(course.nodes)} positions, known to {decade(error)} of its size", observer.sentence,
                 *held_note(course.first), text)
-    judged = replace(found, boundary=CONTINUOUS)
-    return _finished(course, judged, values, seen, verdict, kind, title, evidence, found.values)
+    judged = replace(result, boundary=CONTINUOUS)
+    return _finished(course, judged, values, seen, verdict, kind, title, evidence, result.values)
 
 
-def _finished(course: Course, found: Spectrum, values: np.ndarray, seen: list[Seen], verdict: str, kind: str, title: str,
+def _finished(course: Course, result: Spectrum, values: np.ndarray, seen: list[Seen], verdict: str, kind: str, title: str,
               evidence: tuple[str, ...], factors: np.ndarray | None = None) -> Stability:
     """The result from exponents as an observer sees them; factors: multipliers, if not those of the exponents."""
     order = ordered(values)
-    named = modes_of(found, shapes_of(course.first), f"{title}: modes", values=values, seen=seen)
+    named = modes_of(result, shapes_of(course.first), f"{title}: modes", values=values, seen=seen)
     factors = np.exp(values * course.period) if factors is None else factors
     return Stability(title, verdict, kind, course.period, values[order], factors[order], named, evidence,
                      course.first.selection.held, None)
@@ -280,20 +280,20 @@ def _as_seen(observer: Observer, values: np.ndarray, shape: Callable[[int], np.n
              fixed: bool) -> tuple[np.ndarray, list[Seen]]:
     """Exponents with the multiple of the frequency that their largest harmonic has, and the harmonics counted from there."""
     shifted = values.astype(complex)
-    found: dict[int, Seen] = {}
+    result: dict[int, Seen] = {}
     for k in np.argsort(-values.imag, kind="stable").tolist():
         partner = _partner(values, k)
-        if partner in found and partner != k:  # the two of a pair are seen alike, with opposite signs
-            other = found[partner]
+        if partner in result and partner != k:  # the two of a pair are seen alike, with opposite signs
+            other = result[partner]
             main = round(float((shifted[partner] - values[partner]).imag * observer.course.period / (2 * np.pi)))
             shifted[k] -= 2j * np.pi / observer.course.period * main
-            found[k] = replace(other, harmonics=tuple((-multiple, share) for multiple, share in other.harmonics))
+            result[k] = replace(other, harmonics=tuple((-multiple, share) for multiple, share in other.harmonics))
             continue
         seen = observer.seen(shape(k), fixed)
         main = seen.harmonics[0][0]
         shifted[k] += 2j * np.pi / observer.course.period * main
-        found[k] = replace(seen, harmonics=tuple((multiple - main, share) for multiple, share in seen.harmonics))
-    return shifted, [found[k] for k in range(len(values))]
+        result[k] = replace(seen, harmonics=tuple((multiple - main, share) for multiple, share in seen.harmonics))
+    return shifted, [result[k] for k in range(len(values))]
 
 
 def _partner(values: np.ndarray, k: int) -> int:

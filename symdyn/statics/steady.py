@@ -122,9 +122,9 @@ def further_on(point: OperatingPoint, manifold: Manifold) -> list[OperatingPoint
         here = rest(point.module, point.t + t, x, point.p, point.inputs)
         return np.asarray(here.balance[here.parts["q_dot"]])
 
-    found = scipy.integrate.solve_ivp(rates, (0.0, float(times[-1])), point.q, "DOP853", times, rtol=PRECISE, atol=PRECISE)
+    result = scipy.integrate.solve_ivp(rates, (0.0, float(times[-1])), point.q, "DOP853", times, rtol=PRECISE, atol=PRECISE)
     points = []
-    for t, q in zip(found.t, found.y.T, strict=True):
+    for t, q in zip(result.t, result.y.T, strict=True):
         x = np.concatenate([q, point.x[n_q:]])
         points.append(in_motion(rest(point.module, point.t + float(t), x, point.p, point.inputs), manifold.selection))
     return points
@@ -138,7 +138,7 @@ def fastest(point: OperatingPoint) -> float:
 
 def depends_on_time(point: OperatingPoint) -> bool:
     """Whether t is an argument of the equations."""
-    return "t" in point.module.unit("balance").metadata.arguments.get("balance", ())
+    return "t" in point.module.library("balance").metadata.arguments.get("balance", ())
 
 
 def _difference(a: Manifold, b: Manifold, slowest: float) -> str:

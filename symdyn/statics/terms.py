@@ -17,7 +17,7 @@ from symdyn.arguments import fixed
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.runtime.constraints import names as constraint_names
 from symdyn.runtime.inputs.following import RATES
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -89,7 +89,7 @@ class OperatingPoint:
         """
         given = {f"({kind} {key})": value for kind, entries in groups.items() for key, value in entries.items()}
         given |= self._given_rates()
-        ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata.ud]
+        ud = [given.get(n, 0.0) for n in self.module.library(name).metadata.ud]
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
     def by(self, names: Sequence[str]) -> np.ndarray:
@@ -101,15 +101,15 @@ class OperatingPoint:
 
         Names are those of coordinates, speeds, states, inputs, parameters, accelerations ("u_dot") and multipliers.
         """
-        about = self.module.unit(function).metadata.ud
+        about = self.module.library(function).metadata.ud
         given = self._given_rates()
         rows = np.tile([given.get(n, 0.0) for n in about], (len(names), 1))
         for row, name in zip(rows, names, strict=True):
             row[about.index(f"(along {name})")] = 1.0
         if not len(names):
             return np.zeros((int(np.prod(self.module.shape(function))), 0))
-        found: np.ndarray = self.module.evaluate(function, self.t, self.x, self.p, self.inputs, rows)
-        return found.reshape(len(names), -1).T
+        result: np.ndarray = self.module.evaluate(function, self.t, self.x, self.p, self.inputs, rows)
+        return result.reshape(len(names), -1).T
 
     @property
     def _statics(self) -> int:
@@ -206,8 +206,8 @@ class OperatingPoint:
         by_q, rate = self.whole_x[self.parts["q_dot"], :self.sizes[0]], self.evaluate("N_dot")
         if not by_q.any() and not rate.any():
             return np.zeros((self.sizes[1], self.sizes[1]))
-        found: np.ndarray = np.linalg.lstsq(self.N, rate - by_q @ self.N, rcond=None)[0]
-        return found
+        result: np.ndarray = np.linalg.lstsq(self.N, rate - by_q @ self.N, rcond=None)[0]
+        return result
 
     def moved(self, v: np.ndarray) -> np.ndarray:
         """The coordinates after the velocities v (n_u,) for a unit of time, unit vectors of length 1."""

@@ -16,7 +16,7 @@ from symdyn.statics.search import Search, Trial
 from symdyn.statics.sensitivity import second
 from symdyn.statics.spectrum import ZERO
 from symdyn.statics.terms import OperatingPoint, coordinate_names, multiplier, null_space
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 # Where parameters or inputs are solved for, less than this part of the largest stiffness, scaled, counts as none.
 LEAST = 1e-9
@@ -55,8 +55,9 @@ def demand_stiffness(search: Search) -> None:
               + (f"; or begin with other values of {', '.join(trial.selection.unknown)}, in params or inputs: where they are "
                  "zero they may have no effect" if trial.selection.unknown else ""))
     if any(lost):
-        parts = [f"along {_described(direction, labels)} {found}" for direction, found in zip(loose, lost, strict=True) if found]
-        none = [_described(direction, labels) for direction, found in zip(loose, lost, strict=True) if not found]
+        parts = [f"along {_described(direction, labels)} {result}"
+                 for direction, result in zip(loose, lost, strict=True) if result]
+        none = [_described(direction, labels) for direction, result in zip(loose, lost, strict=True) if not result]
         parts += [f"there is no stiffness along {each}" for each in none]
         raise EquilibriumNotUnique(f"{module.name}: whether the equilibrium is unique is not decided by the digits: "
                                    f"{'; '.join(parts)}{remedy}, or bring the sizes closer together")
@@ -99,12 +100,12 @@ def _lost(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray
     u, v    (n_u,) left and right direction; leader: the coordinate by whose displacement sizes are given
     terms   size of the terms of the stiffness
     """
-    found = [each for each in (_contribution(point, states, u, v, k) for k in range(len(point.p) + len(point.inputs))) if each]
-    if not found:
+    result = [each for each in (_contribution(point, states, u, v, k) for k in range(len(point.p) + len(point.inputs))) if each]
+    if not result:
         return ""
     unit = _STIFFNESSES.get(point.module.metadata.units.get(point.module.metadata.u[leader], ""), "(N, m)")
     by = abs(u[leader] * v[leader]) or float(np.abs(u).max() * np.abs(v).max())
-    most, together = max(abs(each) for each in found) / by, abs(sum(found)) / by
+    most, together = max(abs(each) for each in result) / by, abs(sum(result)) / by
     return (f"loads make a stiffness of {together:.3g} {unit} in sums of terms of {max(terms / by, most):.3g} {unit}, known to "
             f"{max(error / by, EPSILON * most):.1g} {unit} only")
 
@@ -143,8 +144,8 @@ def _contribution(point: OperatingPoint, states: list[int], u: np.ndarray, v: np
     columns = [second(point, changes, unit, none, none, z_of_v @ unit, np.zeros(n_c)) for unit in np.eye(n_u)]
     change = np.array(columns).T  # of the statics by v, by the parameter
     weights = np.concatenate([u, np.zeros(n_c), u_z])
-    found = float(weights @ change @ v)
-    return value * found if abs(found) > ZERO * EPSILON * float(np.abs(weights) @ np.abs(change) @ np.abs(v)) else 0.0
+    result = float(weights @ change @ v)
+    return value * result if abs(result) > ZERO * EPSILON * float(np.abs(weights) @ np.abs(change) @ np.abs(v)) else 0.0
 
 
 def _direction_names(trial: Trial) -> list[str]:

@@ -80,15 +80,15 @@ def _angles(tested: SystemUnderTest, kind: str, d: float, sol: Any, truth: np.nd
         return Row("gimbal lock", tested.name, f"{done}: {sol.message}", None, None, "", DEGRADE if warned
                    else FAIL, "angles have no rates there; the run stops and names it" if named else
                    "the run stops without naming gimbal lock")
-    found = float(np.abs(_rotations(sol) - truth).max())
+    result = float(np.abs(_rotations(sol) - truth).max())
     # Rates of angles grow as one over the distance, and so do errors of the step control on the way past.
     bound = min((sol.n_steps + usual) * 2 * math.sqrt(6) * rtol * (1 + 2 * 5.0) / max(d, 1e-300), 1e-6)
-    if found <= bound:
-        return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", found, bound, origin,
+    if result <= bound:
+        return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", result, bound, origin,
                    PASS if sol.n_steps < 100 * usual or named else FAIL,
                    "the motion is right" if sol.n_steps < 100 * usual else "the motion is right, at many times the usual steps, "
                    f"which is {'warned' if named else 'not warned'}")
-    return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", found, bound, origin,
+    return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", result, bound, origin,
                DEGRADE if named else FAIL, "digits are lost near gimbal lock, and a warning says so" if named else
                "digits are lost near gimbal lock without a word")
 
@@ -120,14 +120,14 @@ def flips(short: bool) -> Iterator[Row]:
     for method in methods or ["DOP853"]:
         rtol = 1e-13
         sol = tested.run(np.array([0.0, end]), start, rtol=rtol, atol=rtol, method=method)
-        found = float(np.abs(sol.u[-1] - wanted).max())
+        result = float(np.abs(sol.u[-1] - wanted).max())
         local = local_error(tested, min(end, 20 * float(T)), rtol, np.ones(7), start, method)
         bound = sol.n_steps * (2 * local + 16 * EPS) * growth * 10
         if not sol.success:
             yield Row("flips", tested.name, f"{method}: {periods} periods", None, None, "", FAIL, sol.message)
             continue
         yield within("flips", tested.name, f"{method}: {1.1 * periods:g} periods about the intermediate axis, {sol.n_steps} "
-                     f"steps at rtol {rtol:g}: angular velocity against elliptic functions (relative to 1 rad/s)", found, bound,
+                     f"steps at rtol {rtol:g}: angular velocity against elliptic functions (relative to 1 rad/s)", result, bound,
                      f"steps times their largest error ({local:.1g}, measured) times the derivative of the closed form by its "
                      f"start ({growth:.2g}), ten times for the place in a period where they are made",
                      "the flips stay in time", "the flips are early or late")
@@ -193,11 +193,11 @@ def rotor(short: bool) -> Iterator[Row]:
     if not sol.success:
         yield Row("fast rotor", tested.name, f"{end:g} s at 1e4 rad/s", None, None, "", FAIL, sol.message)
         return
-    found = max(float(np.abs(sol.q[:, 1] - tilt).max()), float(np.abs(sol.q[:, 0] - rate * sol.t).max()))
+    result = max(float(np.abs(sol.q[:, 1] - tilt).max()), float(np.abs(sol.q[:, 0] - rate * sol.t).max()))
     local = local_error(tested, end, rtol, scales, start)
     bound = sol.n_steps * (2 * local + 16 * EPS) * (1 + end)
     yield within("fast rotor", tested.name, f"rotor at 1e4 rad/s on a platform that precesses at {rate:.3g} rad/s, {end:g} s, "
-                 f"{sol.n_steps} steps: largest error of tilt and precession, rad", found, bound, "steps times their largest "
+                 f"{sol.n_steps} steps: largest error of tilt and precession, rad", result, bound, "steps times their largest "
                  f"error ({local:.1g}, measured), which nutation keeps and precession lets grow by 1 + t", "the platform "
                  "precesses steadily, as it must", "the platform leaves its steady precession")
     energy = sol.energy_error()

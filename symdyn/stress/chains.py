@@ -27,12 +27,12 @@ def long_chains(short: bool) -> Iterator[Row]:
         where = states(tested, 4 if short else 8)
         measured = Measured(tested, "rhs", where, None, emitted(tested, tested.everything)["rhs"])
         values = tested.evaluate("rhs", where.t, where.x, None, where.inputs, where.ud)
-        found = measured.compared(values, tested.backend)
+        result = measured.compared(values, tested.backend)
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("long chains", f"{name}({n})", f"{tested.equations.tape('rhs').operations} operations, accelerations at "
                      f"{len(where.x)} states, condition of the mass matrix up to {finite.max(initial=1.0):.2g}, "
-                     f"{found.rejected} rejected", [found])
-        yield from first_order_row(tested, f"accelerations at {len(where.x)} states", [found])
+                     f"{result.rejected} rejected", [result])
+        yield from first_order_row(tested, f"accelerations at {len(where.x)} states", [result])
         rtol, end = 1e-8, 0.2 if short else 0.5
         try:
             motion = path(tested, end, rtol)

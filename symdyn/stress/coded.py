@@ -44,26 +44,26 @@ class Coded:
         for one in statements:
             if not len(todo):
                 break
-            found = first_order(one.tape, leaves(tested, rows[todo], params), len(todo))
-            self._take(found, todo)
+            result = first_order(one.tape, leaves(tested, rows[todo], params), len(todo))
+            self._take(result, todo)
             if one.smooths:
-                holds = todo[~found.failed]
+                holds = todo[~result.failed]
                 found_there = exactly_as_written(tested, one.tape, rows[holds], params)
                 self.hi[holds], self.lo[holds] = halves(found_there, size)
-            todo = todo[found.failed]
+            todo = todo[result.failed]
 
-    def _take(self, found: FirstOrder, where: np.ndarray) -> None:
-        self.known[where] = ~found.failed & (found.divisors < HIGHER_ORDER)
-        self.divisors[where] = found.divisors
+    def _take(self, result: FirstOrder, where: np.ndarray) -> None:
+        self.known[where] = ~result.failed & (result.divisors < HIGHER_ORDER)
+        self.divisors[where] = result.divisors
         for backend, bounds in self._bounds.items():
-            bounds[where] = SAFETY * found.of(backend)
+            bounds[where] = SAFETY * result.of(backend)
 
     def bound(self, backend: str) -> np.ndarray:
         """Of rounding errors (n, size), infinite where none is known."""
-        found = self._bounds[backend]
+        result = self._bounds[backend]
         # Products of two errors, where a result is a product of two numbers that vanish but for rounding.
-        found = found + EPS * largest(found, self.labels, self.factors)
-        return np.where(self.known[:, None], found, np.inf)  # type: ignore[no-any-return]
+        result = result + EPS * largest(result, self.labels, self.factors)
+        return np.where(self.known[:, None], result, np.inf)  # type: ignore[no-any-return]
 
     def beyond(self, values: np.ndarray, backend: str) -> np.ndarray:
         """Decimal digits by which errors of values (n, size) exceed the bound, (n,); -16 where there is nothing to see."""
@@ -87,10 +87,10 @@ def imbalance(tested: SystemUnderTest, rows: np.ndarray, u_dot: np.ndarray, back
     true = {name: exactly_as_written(tested, tape, rows) for name, tape in tapes.items()}
     off = {}
     for name, tape in tapes.items():
-        found = SAFETY * first_order(tape, leaves(tested, rows), len(rows)).of(backend)
+        result = SAFETY * first_order(tape, leaves(tested, rows), len(rows)).of(backend)
         # Of an algorithm with branches so many roundings of what is largest.
-        sizes = np.abs(halves(true[name], found.shape[1])[0]).max(axis=1, initial=0.0, keepdims=True)
-        off[name] = np.where(np.isfinite(found), found, EPS * tape.longest_chain() * sizes)
+        sizes = np.abs(halves(true[name], result.shape[1])[0]).max(axis=1, initial=0.0, keepdims=True)
+        off[name] = np.where(np.isfinite(result), result, EPS * tape.longest_chain() * sizes)
     missed = np.full(len(u_dot), -16.0)
     with mpmath.workdps(DIGITS):
         for k, row in enumerate(u_dot):

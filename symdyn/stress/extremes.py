@@ -43,7 +43,7 @@ def steps(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
             named = "t =" in sol.message and "state there" in sol.message
             yield Row("step extremes", tested.name, done, None, None, "", DEGRADE if named else FAIL, sol.message)
             continue
-        found = float(np.linalg.norm((sol.x[-1] - usual.x[-1]) / motion.scales))
+        result = float(np.linalg.norm((sol.x[-1] - usual.x[-1]) / motion.scales))
         if rtol > 1e-3:
             yield within("step extremes", tested.name, f"{done}: steps", sol.n_steps, usual.n_steps if np.isfinite(sol.x).all()
                          else 0, "no more steps than at the usual tolerance, and finite states", "it gets there in few steps")
@@ -51,7 +51,7 @@ def steps(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
         allowed = 2 * math.sqrt(len(motion.scales)) * rtol if rtol > RTOL else motion.step_error
         chain = tested.equations.tape("rhs").longest_chain()
         bound = (sol.n_steps + usual.n_steps) * (allowed * (2 if tested.constrained else 1) + 8 * chain * EPS) * grown
-        yield within("step extremes", tested.name, f"{done}: difference at the end", found, bound,
+        yield within("step extremes", tested.name, f"{done}: difference at the end", result, bound,
                      f"steps times the error one may have times the largest magnification ({grown:.2g})",
                      "the end does not depend on what was asked of the steps", "the end is another")
         if options and "first_step" in options:
@@ -85,10 +85,10 @@ def denormals(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     if not one.success:
         raise MotionStops(float(one.t[-1]), end, one.message)
     size = max(float(np.abs(one.x).max()), 1e-300)
-    found = float(np.abs(one.x[-1] - two.x[-1]).max()) / size if two.success else float("inf")
+    result = float(np.abs(one.x[-1] - two.x[-1]).max()) / size if two.success else float("inf")
     # Denormals differ from zero by 1e-323, whatever the motion magnifies by.
     yield within("denormals", tested.name, f"zeros of the start are 5e-324 instead, {end:g} s: largest difference at the end",
-                 found, 1e-12, "a change of 5e-324 may change roundings of the last place only, and where these select steps "
+                 result, 1e-12, "a change of 5e-324 may change roundings of the last place only, and where these select steps "
                  "no more than the digits above 1e-12", "denormal numbers are as zeros", two.message if not two.success else
                  "denormal numbers lead elsewhere")
 
@@ -112,14 +112,14 @@ def masses(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
         except SymdynError as error:
             yield Row("mass ratios", tested.name, done, None, None, "", DEGRADE, str(error))
             continue
-        found = measured.compared(values, tested.backend)
-        every.append(replace(found, name=f"{ratio:g}"))
+        result = measured.compared(values, tested.backend)
+        every.append(replace(result, name=f"{ratio:g}"))
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("mass ratios", tested.name, f"{done}: accelerations at {FEW} states, condition up to {finite.max():.2g}, "
-                     f"{found.rejected} rejected", [found])
-        if found.rejected and found.least_rejected < 1e8:
-            yield Row("mass ratios", tested.name, f"{done}: {found.rejected} states rejected, condition from "
-                      f"{found.least_rejected:.2g}", None, None, "", FAIL, "well-conditioned states are rejected")
+                     f"{result.rejected} rejected", [result])
+        if result.rejected and result.least_rejected < 1e8:
+            yield Row("mass ratios", tested.name, f"{done}: {result.rejected} states rejected, condition from "
+                      f"{result.least_rejected:.2g}", None, None, "", FAIL, "well-conditioned states are rejected")
     if every:
         yield from first_order_row(tested, f"accelerations at {FEW} states for each ratio of masses", every, "ratios",
                                    FEW * len(every))

@@ -50,13 +50,13 @@ class Finding:
         return PASS if self.digits <= 0 else DEGRADE if self.plain <= 0 else FAIL
 
 
-def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
+def judged(check: str, system: str, done: str, result: Sequence[Finding]) -> Row:
     """The row of digits that functions lose beyond what the condition costs: every function is judged by itself, and the worst
     verdict counts. Within the condition of plain numbers it is said so."""
     origin = ("decimal digits lost beyond log10(condition of inputs and of what is solved, scaled) + log10(longest chain of "
               "operations), each of which may round once")
-    verdict = max((f.verdict for f in found), key=(PASS, DEGRADE, FAIL).index)
-    alike = [f for f in found if f.verdict == verdict]
+    verdict = max((f.verdict for f in result), key=(PASS, DEGRADE, FAIL).index)
+    alike = [f for f in result if f.verdict == verdict]
     worst = max(alike, key=lambda f: f.digits)
     named = ", ".join(f.name for f in alike) if verdict != PASS else worst.name
     if verdict == DEGRADE:
@@ -68,61 +68,61 @@ def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
                   "no more digits are lost than the problem itself costs", "digits are lost that the problem does not cost")
 
 
-def rejections(tested: SystemUnderTest, label: str, found: Sequence[Finding], rejected: int) -> Row:
+def rejections(tested: SystemUnderTest, label: str, result: Sequence[Finding], rejected: int) -> Row:
     """Values that were rejected: right where the system that is solved has no digits left."""
-    least = min(f.least_rejected for f in found)
+    least = min(f.least_rejected for f in result)
     return Row("rejected states", tested.name, f"{label}: {rejected} values rejected; condition there from {least:.2g}", 1 / least
                if least > 0 else np.inf, 1e-8, "a pivot that vanishes to half of the digits", DEGRADE if least > 1e8 else FAIL,
                "only states are rejected whose equations are singular to half of the digits" if least > 1e8 else
                "states are rejected whose equations are well-conditioned")
 
 
-def first_order_row(tested: SystemUnderTest, label: str, found: Sequence[Finding], of: str = "functions",
+def first_order_row(tested: SystemUnderTest, label: str, result: Sequence[Finding], of: str = "functions",
                     states: int = 0) -> Iterator[Row]:
     """The row of errors against what rounding of every operation may do at most, at ordinary states.
 
     of       what the findings are of;  states: how many there are in all where each has its own, 0 where all share them
     """
-    known = [f for f in found if f.beyond > -np.inf]
+    known = [f for f in result if f.beyond > -np.inf]
     noise = ""
-    if any(f.unknown for f in found):
-        many = f"{sum(f.unknown for f in found)} of {states}" if states else f"up to {max(f.unknown for f in found)}"
+    if any(f.unknown for f in result):
+        many = f"{sum(f.unknown for f in result)} of {states}" if states else f"up to {max(f.unknown for f in result)}"
         noise = f"; none holds at {many} states, where a divisor loses all but one digit"
     if not known:
         if noise:
-            yield Row("first order", tested.name, f"{label}: 0 of {len(found)} {of}{noise}", None, None, "", DEGRADE,
+            yield Row("first order", tested.name, f"{label}: 0 of {len(result)} {of}{noise}", None, None, "", DEGRADE,
                       "nothing can be said of errors: divisors are nothing but rounding error")
         return
     worst = max(known, key=lambda f: f.beyond)
     beyond = [f.name for f in known if f.beyond > 0]
     place = f"beyond it {', '.join(beyond)}" if beyond else f"nearest to it {worst.name}"
-    done = f"{label}: {len(known)} of {len(found)} {of}; {place}"
-    others = ", ".join(f.name for f in found if f.beyond == -np.inf and not f.unknown)
+    done = f"{label}: {len(known)} of {len(result)} {of}; {place}"
+    others = ", ".join(f.name for f in result if f.beyond == -np.inf and not f.unknown)
     if others:
         done += f"; no bound is known of {others}, which run an algorithm with branches"
     yield within("first order", tested.name, done + noise, worst.beyond, 0.0, BOUND, "errors are those of rounding",
                  "errors are larger than rounding can make them")
 
 
-def set_aside(tested: SystemUnderTest, found: Sequence[Finding]) -> Iterator[Row]:
+def set_aside(tested: SystemUnderTest, result: Sequence[Finding]) -> Iterator[Row]:
     """Rows of states at which the condition does not tell what digits are lost: what is, and whether rounding explains it."""
-    if any(f.near.states or f.near.beyond > 0 or f.near.imbalance > 0 for f in found):
-        yield _aside(tested, "lost rank", [(f.name, f.near) for f in found],
+    if any(f.near.states or f.near.beyond > 0 or f.near.imbalance > 0 for f in result):
+        yield _aside(tested, "lost rank", [(f.name, f.near) for f in result],
                      "which lie next to a position where constraints lose rank", "the exact multipliers and accelerations grow "
                      "without bound towards such a position; they are smoothed there, so that motions pass it, and what is "
                      "computed is the smooth solution but for rounding")
-    if any(f.singular.states or f.singular.beyond > 0 or f.singular.imbalance > 0 for f in found):
-        least = min(f.singular.least for f in found)
-        yield _aside(tested, "singular states", [(f.name, f.singular) for f in found],
+    if any(f.singular.states or f.singular.beyond > 0 or f.singular.imbalance > 0 for f in result):
+        least = min(f.singular.least for f in result)
+        yield _aside(tested, "singular states", [(f.name, f.singular) for f in result],
                      f"where the condition of what is solved is {least:.2g} or more", "the mass matrix is singular to the last "
                      "digit, as at gimbal lock: accelerations have no digits there, and a motion that comes there stops and "
                      "names it")
 
 
-def _aside(tested: SystemUnderTest, check: str, found: Sequence[tuple[str, Aside]], where: str, why: str) -> Row:
-    every = [aside for _, aside in found]
+def _aside(tested: SystemUnderTest, check: str, result: Sequence[tuple[str, Aside]], where: str, why: str) -> Row:
+    every = [aside for _, aside in result]
     beyond, missed = max(a.beyond for a in every), max(a.imbalance for a in every)
-    names = ", ".join(dict.fromkeys(name for name, a in found if a.states or max(a.beyond, a.imbalance) > 0))
+    names = ", ".join(dict.fromkeys(name for name, a in result if a.states or max(a.beyond, a.imbalance) > 0))
     done = (f"{names} at {max(a.states for a in every)} of the states, {where}: up to {max(a.most for a in every):.2g} digits "
             "lost beyond what the condition costs elsewhere")
     if missed > -np.inf:

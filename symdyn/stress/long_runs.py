@@ -128,9 +128,9 @@ def stiffness(short: bool) -> Iterator[Row]:
                 continue
             taken.append(sol.n_steps)
             # Slow entries only: positions, the speed of mass 1; the spring's own speed follows from them.
-            found = float(np.abs(sol.x[-1, :3] - wanted[:3]).max())
+            result = float(np.abs(sol.x[-1, :3] - wanted[:3]).max())
             bound = sol.n_steps * 2 * math.sqrt(4) * rtol
-            yield within("stiffness", tested.name, f"{done}: error of positions and slow speed", found, bound,
+            yield within("stiffness", tested.name, f"{done}: error of positions and slow speed", result, bound,
                          "steps times the error one may have; a damped motion magnifies none",
                          "the slow motion is right", "the slow motion is wrong")
         if method in methods and len(taken) > 1:

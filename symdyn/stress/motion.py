@@ -105,11 +105,11 @@ def reversal(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
         yield Row("reversal", tested.name, f"{end:g} s forward and back", None, None, "", FAIL, message)
         return
     steps = forward.n_steps + returned.n_steps
-    found = float(np.linalg.norm((returned.x[-1] - forward.x[0]) / motion.scales))
+    result = float(np.linalg.norm((returned.x[-1] - forward.x[0]) / motion.scales))
     chain = tested.equations.tape("rhs").longest_chain()
     bound = steps * (motion.step_error * (2 if tested.constrained else 1) + 8 * chain * EPS) * float(back[k])
     yield within("reversal", tested.name, f"{end:g} s forward and back, {steps} steps at rtol {RTOL:g}: distance from the start",
-                 found, bound, f"steps times the error one may have times the largest magnification back to the start "
+                 result, bound, f"steps times the error one may have times the largest magnification back to the start "
                  f"({back[k]:.2g})",
                  "it returns to the start as far as the tolerances promise", "the way back is another motion")
 
@@ -141,13 +141,13 @@ def divergence(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     size, grown = float(np.linalg.norm(change)), max(float(norms[:k + 1].max()), 1.0)
     if tested.constrained or tested.module.metadata.unit_groups:
         wanted, coarse = (_tangent(tested, times[-1], runs[0].x[-1], motion.scales, w) for w in (wanted, coarse))
-    found = float(np.linalg.norm(apart - wanted) / (size * grown))
+    result = float(np.linalg.norm(apart - wanted) / (size * grown))
     allowed = 2 * math.sqrt(len(motion.scales)) * 1e-12 * (2 if tested.constrained else 1)
     parts = (float(np.linalg.norm(wanted - coarse)), bent, 2 * runs[0].n_steps * grown * allowed)
     yield within("divergence", tested.name,
                  f"a change of {size:.1g} of the start, after {times[-1]:.3g} s {np.linalg.norm(apart) / size:.3g} times as "
                  "large: difference from the variational equations with the exact Jacobian, over the largest magnification",
-                 found, sum(parts) / (size * grown), "the variational equations' own error (from intervals twice as long), the "
+                 result, sum(parts) / (size * grown), "the variational equations' own error (from intervals twice as long), the "
                  "change's higher orders (from twice the change), errors of steps", "small changes grow as they must",
                  "the Jacobian is not that of the motion")
 

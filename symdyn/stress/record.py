@@ -102,8 +102,8 @@ class StressReport:
 
     def count(self) -> dict[str, int]:
         """How many rows of each verdict."""
-        found = Counter(row.verdict for row in self.rows)
-        return {verdict: found[verdict] for verdict in (PASS, DEGRADE, FAIL)}
+        result = Counter(row.verdict for row in self.rows)
+        return {verdict: result[verdict] for verdict in (PASS, DEGRADE, FAIL)}
 
     def table(self) -> str:
         """The rows as text, the numbers at the left; below each what was done, where the bound comes from, and why."""

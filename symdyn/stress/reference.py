@@ -11,7 +11,7 @@ import numpy as np
 from symdyn.functions.tapes import function_tape, tape_as_derived
 from symdyn.precision.program import Lost, program
 from symdyn.stress.system_under_test import EPS, SystemUnderTest
-from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
+from symdyn.tape.intrinsics import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape, unsigned
 from symdyn.verification.identities import equilibrated
@@ -33,13 +33,13 @@ def exact(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inpu
     fixed, free = _fixed(tested, params), free_leaves(tested)
     rows = [[context.mpf(float(v)) for v in row] for row in np.column_stack([t, x, inputs, ud])]
     programs = [program(function_tape(tested.equations, name), context, fixed, free)]
-    found: list[list[mpmath.mpf] | None] = []
+    result: list[list[mpmath.mpf] | None] = []
     for row in rows:
         try:
-            found.append(programs[0](row))
+            result.append(programs[0](row))
         except (Lost, ValueError, TypeError, ZeroDivisionError):
-            found.append(_otherwise(tested, name, context, fixed, free, programs, row))
-    return found
+            result.append(_in_fallback(tested, name, context, fixed, free, programs, row))
+    return result
 
 
 def exactly_as_written(tested: SystemUnderTest, tape: Tape, rows: np.ndarray,
@@ -47,13 +47,13 @@ def exactly_as_written(tested: SystemUnderTest, tape: Tape, rows: np.ndarray,
     """A tape with 32 digits at rows of its free leaves, (n, n_free); None where it is undefined."""
     context = _precise()
     run = program(tape, context, _fixed(tested, params), free_leaves(tested))
-    found: list[list[mpmath.mpf] | None] = []
+    result: list[list[mpmath.mpf] | None] = []
     for row in rows:
         try:
-            found.append(run([context.mpf(float(v)) for v in row]))
+            result.append(run([context.mpf(float(v)) for v in row]))
         except (Lost, ValueError, TypeError, ZeroDivisionError):
-            found.append(None)
-    return found
+            result.append(None)
+    return result
 
 
 def halves(rows: Sequence[list[mpmath.mpf] | None], size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -89,14 +89,14 @@ def _fixed(tested: SystemUnderTest, params: np.ndarray | None) -> dict[str, floa
     return {s.name: v for s, v in zip(tested.symbols.parameters, values.tolist(), strict=True)}
 
 
-def _otherwise(tested: SystemUnderTest, name: str, context: Any, fixed: dict[str, float], free: Sequence[str], programs: list,
-               row: list) -> list[mpmath.mpf] | None:
+def _in_fallback(tested: SystemUnderTest, name: str, context: Any, fixed: dict[str, float], free: Sequence[str], programs: list,
+                 row: list) -> list[mpmath.mpf] | None:
     """By the equations for states where what the usual ones divide by vanishes."""
-    if tested.equations.otherwise is None:
+    if tested.equations.singular_fallback is None:
         return None
     if len(programs) == 1:
-        programs.append(program(tested.equations.otherwise.tape(name), context, fixed, free)
-                        if name in tested.equations.otherwise.quantities else None)
+        programs.append(program(tested.equations.singular_fallback.tape(name), context, fixed, free)
+                        if name in tested.equations.singular_fallback.quantities else None)
     try:
         return None if programs[1] is None else programs[1](row)
     except (Lost, ValueError, TypeError, ZeroDivisionError):
@@ -113,10 +113,10 @@ def solved(tested: SystemUnderTest, name: str) -> bool:
     if name not in MAY_DEPEND:
         return False
     n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
-    found = list(tested.equations.quantity("rhs").ravel())[n_q:n_q + n_u]
+    result = list(tested.equations.quantity("rhs").ravel())[n_q:n_q + n_u]
     if tested.has("lam"):
-        found += list(tested.equations.quantity("lam").ravel())
-    unknown = {unsigned(e) for e in found if isinstance(unsigned(e), Node) and unsigned(e).op != "leaf"}
+        result += list(tested.equations.quantity("lam").ravel())
+    unknown = {unsigned(e) for e in result if isinstance(unsigned(e), Node) and unsigned(e).op != "leaf"}
     return not unknown.isdisjoint(tape_as_derived(tested.equations, name).steps)
 
 
@@ -137,11 +137,11 @@ def conditions(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np
     whole = np.zeros((len(M), n + C.shape[1], n + C.shape[1]))
     whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = M, C, C.transpose(0, 2, 1)
     values = _singular_values(tested, t, x, params)
-    found = np.array([_condition(equilibrated(w) if scaled else w, int((v <= DEPENDENT).sum()))
-                      for w, v in zip(whole, values, strict=True)])
+    result = np.array([_condition(equilibrated(w) if scaled else w, int((v <= DEPENDENT).sum()))
+                       for w, v in zip(whole, values, strict=True)])
     if not gradients:
-        return found
-    return found * [max(1.0, 1 / v[v > DEPENDENT][-1]) if (v > DEPENDENT).any() else np.inf for v in values]
+        return result
+    return result * [max(1.0, 1 / v[v > DEPENDENT][-1]) if (v > DEPENDENT).any() else np.inf for v in values]
 
 
 def _singular_values(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np.ndarray | None) -> np.ndarray:
@@ -163,7 +163,7 @@ def smoothed(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, p
     """Whether states are at positions of lost rank, or so near that the smoothing there is larger than rounding errors, (n,).
 
     Regularized with e and iterated, a singular value s keeps the part (1 + s^2 / e^2)^-ROUNDS of its error; see
-    symdyn.tape.kernels.
+    symdyn.tape.intrinsics.
     """
     if not tested.constrained or not solved(tested, name):
         return np.zeros(len(x), dtype=bool)
@@ -239,11 +239,11 @@ def weights(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, si
 
 def largest(values: np.ndarray, labels: np.ndarray, factors: np.ndarray) -> np.ndarray:
     """For every entry the largest of those that are compared with it, in its own scale, (n, size)."""
-    found = np.zeros(values.shape)
+    result = np.zeros(values.shape)
     scaled = np.nan_to_num(np.abs(values) * factors, nan=0.0, posinf=0.0)
     for label in np.unique(labels):
-        found[:, labels == label] = scaled[:, labels == label].max(axis=1, keepdims=True)
-    return found / factors
+        result[:, labels == label] = scaled[:, labels == label].max(axis=1, keepdims=True)
+    return result / factors
 
 
 def terms(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray,
@@ -278,12 +278,12 @@ def terms(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inpu
     if name == "outputs" and tested.has("positions"):  # often differences of places
         return size("positions")[:, None]
     if name in ("reactions", "cut_loads"):  # sums of weights, inertial forces, loads
-        found = loads + (size("lam") * size("C_r") if tested.constrained else 0.0)
+        result = loads + (size("lam") * size("C_r") if tested.constrained else 0.0)
         if tested.has("mass_matrix"):
-            found = found + size("mass_matrix") * speed**2
+            result = result + size("mass_matrix") * speed**2
             diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
-            found = found + (diagonal * values("rhs")[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
-        return found[:, None]
+            result = result + (diagonal * values("rhs")[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
+        return result[:, None]
     return none
 
 
@@ -294,6 +294,6 @@ def _alone(tested: SystemUnderTest, values: Callable[[str], np.ndarray], n_q: in
     if tested.constrained:
         C = values("C_r").reshape(len(forces), -1, n_u)
         forces = forces + (C.transpose(0, 2, 1) * values("lam")[:, None, :]).sum(axis=2)
-    found = np.zeros((len(forces), len(tested.module.metadata.x)))
-    found[:, n_q:n_q + n_u] = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
-    return found
+    result = np.zeros((len(forces), len(tested.module.metadata.x)))
+    result[:, n_q:n_q + n_u] = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
+    return result

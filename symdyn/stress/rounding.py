@@ -37,7 +37,7 @@ from symdyn.stress.system_under_test import EPS, SystemUnderTest, evaluated
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
 # What is zero on the constraints is looked at beside them, too: this far, of the usual size.
-BESIDE, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
+NEARBY, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
 # States, fewer of long equations (so many operations at 32 digits altogether) and in the short form.
 STATES, WORK, FEW = 1000, 1.5e6, 24
 # Relative changes that conditions are estimated by, and how many.
@@ -105,7 +105,7 @@ def _consistent(tested: SystemUnderTest, x: np.ndarray, x0: np.ndarray) -> np.nd
     return rows
 
 
-def beside(tested: SystemUnderTest, where: States) -> States:
+def off_constraints(tested: SystemUnderTest, where: States) -> States:
     """The same states, every other one off the constraints by a thousandth of what coordinates and speeds usually are."""
     symbols, x = tested.symbols, where.x.copy()
     x[1::2] += ASIDE * np.random.default_rng(2).uniform(-1, 1, x[1::2].shape) * _reach(symbols)
@@ -150,32 +150,32 @@ def rounding(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     n = FEW if short else int(np.clip(WORK / max(operations, 1), FEW, STATES))
     where = towards_lost_rank(tested, states(tested, n))
     # Constraints that depend on others contradict them beside.
-    near = beside(tested, where) if tested.constrained and not redundant(tested, where.t, where.x) else where
+    near = off_constraints(tested, where) if tested.constrained and not redundant(tested, where.t, where.x) else where
     statements = emitted(tested, names)
-    measured = [Measured(tested, name, near if name in BESIDE else where, None, statements[name]) for name in names]
+    measured = [Measured(tested, name, near if name in NEARBY else where, None, statements[name]) for name in names]
     reference: dict[str, np.ndarray] = {}
     every: list[Finding] = []
     for label, unit in _builds(tested, names, short):
         if isinstance(unit, str):
             yield Row("rounding", tested.name, label, None, None, "", FAIL, unit)
             continue
-        same, found = bool(reference), []
+        same, result = bool(reference), []
         for one in measured:
             values = one.run(unit.evaluator(one.name))
             if one.name in reference:
                 same &= bool(np.array_equal(values, reference[one.name], equal_nan=True))
             reference.setdefault(one.name, values)
-            found.append(one.compared(values, "numpy" if label == "NumPy" else "c"))
-        if all(f.digits == -np.inf for f in found):
+            result.append(one.compared(values, "numpy" if label == "NumPy" else "c"))
+        if all(f.digits == -np.inf for f in result):
             raise NotApplicable("no state at which the functions are defined")
-        rejected = sum(f.rejected for f in found)
-        yield from first_order_row(tested, label, found)
+        rejected = sum(f.rejected for f in result)
+        yield from first_order_row(tested, label, result)
         done = (f"{label}: {len(names)} functions at {len(where.x)} states, half of them adversarial, {rejected} values rejected "
                 "where 32 digits have one" + ("; the same bits as the first" if same else ""))
-        yield judged("rounding", tested.name, done, found)
+        yield judged("rounding", tested.name, done, result)
         if rejected:
-            yield rejections(tested, label, found, rejected)
-        every += found
+            yield rejections(tested, label, result, rejected)
+        every += result
     yield from set_aside(tested, every)
 
 
@@ -235,12 +235,12 @@ class Measured:
         self.smoothed = smoothed(tested, name, where.t, where.x, params) & ~self.singular
         rows = np.column_stack([where.t, where.x, where.inputs, where.ud])
         self.coded = Coded(tested, statements, rows, (labels, factors), (self.values, self.rest), params) if statements else None
-        self._subject = tested
+        self._tested = tested
 
     def run(self, evaluator: Any) -> np.ndarray:
         """The function of generated code at the states, (n, size)."""
         where = self.where
-        return evaluated(evaluator, where.t, where.x, self._subject.params, where.inputs, where.ud)
+        return evaluated(evaluator, where.t, where.x, self._tested.params, where.inputs, where.ud)
 
     def compared(self, values: np.ndarray, backend: str = "c") -> Finding:
         """Values of generated code (n, size) against these."""
@@ -278,7 +278,7 @@ class Measured:
     def _imbalance(self, values: np.ndarray, states: np.ndarray, backend: str) -> float:
         """Digits by which accelerations miss their equations beyond what is due, at those of the states where they have no bound
         themselves."""
-        tested, where = self._subject, self.where
+        tested, where = self._tested, self.where
         if self.coded is None or self.name != "rhs" or not tested.has("mass_matrix"):
             return -np.inf
         n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
@@ -292,15 +292,15 @@ def compilers() -> list[Compiler]:
     usual = find_compiler()
     if usual is None:
         return []
-    found = [usual]
+    result = [usual]
     path, package = os.environ.get("PATH"), package_path("ziglang")
     candidates = [("gcc",), ("clang",), *([(str(Path(package).with_name("zig")), "cc")] if package else [])]
     for command in candidates:
         if shutil.which(command[0]):
             other = probe(command, path)
-            if isinstance(other, Compiler) and other.kind not in [c.kind for c in found]:
-                found.append(other)
-    return found
+            if isinstance(other, Compiler) and other.kind not in [c.kind for c in result]:
+                result.append(other)
+    return result
 
 
 def _builds(tested: SystemUnderTest, names: list[str], short: bool) -> Iterator[tuple[str, Any]]:
@@ -314,9 +314,9 @@ def _builds(tested: SystemUnderTest, names: list[str], short: bool) -> Iterator[
             words = tuple(w for w in compiler.command if not (level and w in ("-O0", "-O1", "-O2", "-O3")))
             label = f"C, {compiler.kind} {level}".rstrip()
             try:
-                yield label, tested.unit(names, "c", replace(compiler, command=(*words, level) if level else words))
+                yield label, tested.library(names, "c", replace(compiler, command=(*words, level) if level else words))
             except (CompileError, ArgumentError) as error:
                 yield label, str(error)
-    yield "NumPy", tested.unit(names, "numpy")
+    yield "NumPy", tested.library(names, "numpy")
 
 

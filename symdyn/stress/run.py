@@ -131,21 +131,21 @@ def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
             raise ArgumentError("stress was given no system; pass some, or leave out the argument for the catalogue")
         if own:
             raise ArgumentError(f"the checks {', '.join(own)} have mechanisms of their own; leave out the system")
-        return [(_subject(one), of_system, short) for one in listed]
+        return [(_tested(one), of_system, short) for one in listed]
     listed = list(SHORT if short else catalogue())
     return [*[("", (name,), short) for name in own], *[(name, of_system, short) for name in listed if of_system]]
 
 
-def _subject(system: Any) -> str | SystemUnderTest:
+def _tested(system: Any) -> str | SystemUnderTest:
     """A name, which a process can take, or the system under test; its faults are reported before anything is run."""
     if isinstance(system, str):
         named(system)
         return system
     if not isinstance(system, (System, Equations, SystemUnderTest)):
         raise ArgumentError(f"stress was given {system!r}; pass a System, Equations, or the name of one of the catalogue")
-    found = system if isinstance(system, SystemUnderTest) else SystemUnderTest(system)
-    found.demand_numbers()
-    return found
+    result = system if isinstance(system, SystemUnderTest) else SystemUnderTest(system)
+    result.demand_numbers()
+    return result
 
 
 def _chosen(names: str | Sequence[str] | None) -> list[Check]:
@@ -204,8 +204,8 @@ def _whole(task: Task) -> Result:
     """All checks of one task, in a process of its own."""
     rows: list[Row] = []
     left_out: list[str] = []
-    for found, reasons, _ in _in_turn([task]):
-        rows += found
+    for result, reasons, _ in _in_turn([task]):
+        rows += result
         left_out += reasons
     return rows, left_out, len(task[1])
 

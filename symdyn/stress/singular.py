@@ -60,11 +60,11 @@ def massless(short: bool) -> Iterator[Row]:
     tip = last.add_body("tip")
     last.add_joint(Revolute("shoulder", last.ground, rod, q_1))
     last.add_joint(Revolute("wrist", rod, tip, q_2, parent_point=[1, 0]))
-    yield _refused("massless links", "a last link without mass and inertia", lambda: SystemUnderTest(last).run((0.0, 1.0)),
-                   ("wrist", "q2"))
+    yield _rejected("massless links", "a last link without mass and inertia", lambda: SystemUnderTest(last).run((0.0, 1.0)),
+                    ("wrist", "q2"))
 
 
-def _refused(check: str, what: str, run: Any, words: tuple[str, ...]) -> Row:
+def _rejected(check: str, what: str, run: Any, words: tuple[str, ...]) -> Row:
     """The row of what must be rejected, by a named error or stop that holds one of the words."""
     try:
         sol = run()
@@ -111,8 +111,8 @@ def configurations(short: bool) -> Iterator[Row]:
                      sol.energy_error(), sol.n_steps * 2 * math.sqrt(sol.x.shape[1]) * 2 * RTOL * 10,
                      PROJECTED, "energy passes the singular position")
         if passes is not None:
-            found, where = passes
-            yield within("singular positions", tested.name, f"{done}: distance from the branch {where}", found, 1e-6,
+            result, where = passes
+            yield within("singular positions", tested.name, f"{done}: distance from the branch {where}", result, 1e-6,
                          "half of the digits: branches meet quadratically where they cross", "it stays on its branch",
                          "it leaves its branch at the singular position")
     yield from _four_bar(short)
@@ -205,12 +205,12 @@ def redundant(short: bool) -> Iterator[Row]:
         for k in range(1, times):
             system.close_loop(Revolute(f"again{k}", system.ground, last, parent_point=[d, 0], child_point=[l_3, 0]))
         tested = SystemUnderTest(system)
-        found = np.array([tested.module.rhs(0.0, row) for row in x])
+        result = np.array([tested.module.rhs(0.0, row) for row in x])
         size = np.abs(wanted).max()
         chain = tested.equations.tape("rhs").longest_chain()
         condition = float(conditions(first, np.zeros(len(x)), x).max())
         yield within("redundant", tested.name, f"last hinge closed {times} times, 10 states: accelerations against those with "
-                     "one, relative", float(np.abs(found - wanted).max() / size), 4 * EPS * chain * condition,
+                     "one, relative", float(np.abs(result - wanted).max() / size), 4 * EPS * chain * condition,
                      f"rounding of {chain} operations in a chain times the condition ({condition:.2g}), of both sides",
                      "redundant constraints change nothing")
         sol = tested.run((0.0, 1.0 if short else 5.0), rtol=RTOL)

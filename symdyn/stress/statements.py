@@ -29,8 +29,8 @@ def emitted(tested: SystemUnderTest, names: Sequence[str]) -> dict[str, list[Sta
     """By name the tapes that functions of one unit run: the usual one, and where there is another for states at which a check
     of it fails, that one. Sums are in the order of generated code; algorithms are written out where `written_out` can."""
     tapes = {name: tape_as_derived(tested.equations, name) for name in names}
-    if tested.equations.otherwise is not None:
-        others = tested.equations.otherwise
+    if tested.equations.singular_fallback is not None:
+        others = tested.equations.singular_fallback
         for name in names:
             there = tape_as_derived(others, name)
             if _entries(there) != _entries(tapes[name]):

@@ -16,7 +16,7 @@ from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import Compiler, find_compiler, plain
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
 
@@ -27,7 +27,7 @@ EPS = 2.0**-53
 # Of runs that are compared: all but the last digits.
 RTOL = 1e-10
 # Where a system of the catalogue begins that has no motion of its own: it is in equilibrium.
-BESIDE = {"floating_crane": {"beta": 0.2}}
+NEARBY = {"floating_crane": {"beta": 0.2}}
 # Derivatives, and forms for other purposes.
 IDENTIFICATION, LONG = ("regressor", "inertial_parameters", "base_regressor", "base_parameters"), 1000
 SELDOM = ("jacobian_x", "jacobian_inputs", "input_matrix", "jacobian_params", "power_x", "reactions_by_lam", "residual",
@@ -54,8 +54,8 @@ class SystemUnderTest:
 
     def __init__(self, system: Any) -> None:
         if isinstance(system, str):
-            beside, system = BESIDE.get(system, {}), named(system)
-            system.initial = {**system.initial, **beside}
+            nearby, system = NEARBY.get(system, {}), named(system)
+            system.initial = {**system.initial, **nearby}
         self.equations: Equations = system if isinstance(system, Equations) else system.equations()
         self.name = self.equations.name
         self.symbols = self.equations.symbols
@@ -158,12 +158,12 @@ class SystemUnderTest:
         if name not in self._evaluators:
             together = name in self.everything
             if together and self._whole is None:
-                self._whole = self.unit(self.everything)
-            self._evaluators[name] = (self._whole if together else self.unit((name,))).evaluator(name)
+                self._whole = self.library(self.everything)
+            self._evaluators[name] = (self._whole if together else self.library((name,))).evaluator(name)
         return evaluated(self._evaluators[name], t, x, self.params if params is None else params,
                          self.inputs if inputs is None else inputs, ud)
 
-    def unit(self, names: Sequence[str], backend: str = "", compiler: Compiler | None = None) -> Any:
+    def library(self, names: Sequence[str], backend: str = "", compiler: Compiler | None = None) -> Any:
         """Generated code of functions, loaded.
 
         backend   "c" or "numpy", default: C if there is a compiler; compiler: default the usual one, without optimization
@@ -171,14 +171,14 @@ class SystemUnderTest:
         compiler = compiler or find_compiler()
         if backend == "numpy" or compiler is None:
             source = emit(self.equations, "numpy", names, standalone=False)
-            return PythonUnit.from_source(next(iter(source.files.values())), source.metadata.name)
+            return PythonLibrary.from_source(next(iter(source.files.values())), source.metadata.name)
         source = emit(self.equations, "c", names, standalone=False, integrator=False)
-        return CUnit(next(iter(source.files.values())), source.metadata, plain(compiler) if not backend else compiler)
+        return CLibrary(next(iter(source.files.values())), source.metadata, plain(compiler) if not backend else compiler)
 
 
 def evaluated(evaluator: Any, t: Any, x: np.ndarray, params: np.ndarray, inputs: Any, ud: Any = None) -> np.ndarray:
-    """A function of a unit at rows of states, (n, size), NaN where it cannot be evaluated."""
-    sizes = evaluator.unit.metadata.sizes
+    """A function of a library at rows of states, (n, size), NaN where it cannot be evaluated."""
+    sizes = evaluator.library.metadata.sizes
     rows = np.atleast_2d(np.asarray(x, dtype=float))
     n = len(rows)
     times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=float), (n,)))
@@ -188,15 +188,15 @@ def evaluated(evaluator: Any, t: Any, x: np.ndarray, params: np.ndarray, inputs:
         given = np.zeros((n, sizes.ud))
     try:
         evaluator.set_params(np.asarray(params, dtype=float))
-        found = evaluator.many(times, np.ascontiguousarray(rows), free, given)
-        return np.asarray(found, dtype=float).reshape(n, -1)
+        result = evaluator.many(times, np.ascontiguousarray(rows), free, given)
+        return np.asarray(result, dtype=float).reshape(n, -1)
     except EvaluationError:
         pass
-    size = int(np.prod(evaluator.unit.metadata.shapes[evaluator.name]))
-    found = np.full((n, size), np.nan)
+    size = int(np.prod(evaluator.library.metadata.shapes[evaluator.name]))
+    result = np.full((n, size), np.nan)
     for k in range(n):
         try:
-            found[k] = np.asarray(evaluator.one(float(times[k]), rows[k], free[k], given[k])).ravel()
+            result[k] = np.asarray(evaluator.one(float(times[k]), rows[k], free[k], given[k])).ravel()
         except EvaluationError:
             continue
-    return found
+    return result

@@ -59,12 +59,12 @@ def of_kane(kane: Any, options: Options) -> GivenMatrices:
     given = None if not n_d or kane._k_dnh is kane._k_nh else (kane._k_dnh, kane._f_dnh)
     remarks = [] if auxiliary is None or unknown else ["no reactions by auxiliary speeds: their equations do not name as many "
                                                        "forces"]
-    found = GivenMatrices(
+    result = GivenMatrices(
         name, "kane", symbols, taken.same, mass, forcing, kinematics, (active, inertial), n_d if n_d else None, tuple(rows),
         given, None, options.rates(taken), options.outputs_of(),
         auxiliary if unknown else None, _homogeneous(kane), unknown, tuple(remarks))
-    _compare_angular_velocities(kane, found)
-    return found
+    _compare_angular_velocities(kane, result)
+    return result
 
 
 def _unprojected(kane: Any) -> tuple[sp.MatrixBase, sp.MatrixBase, sp.MatrixBase, sp.MatrixBase]:
@@ -94,14 +94,14 @@ def _rates(kane: Any) -> dict[sp.Expr, sp.Expr] | None:
         return None  # which is a fault that is reported with the equations
     if not 1 < max(len(rows) for rows, _ in order) <= LARGEST:
         return None
-    found = sp.zeros(K.rows, 1)
+    result = sp.zeros(K.rows, 1)
     for rows, columns in order:
         block = K.extract(rows, columns)
-        rest = right.extract(rows, [0]) - K.extract(rows, list(range(K.cols))) * found
+        rest = right.extract(rows, [0]) - K.extract(rows, list(range(K.cols))) * result
         solved = block.adjugate() * rest / block.det()
-        for place, column in enumerate(columns):
-            found[column] = solved[place]
-    return dict(zip(kane._qdot, found, strict=True))
+        for index, column in enumerate(columns):
+            result[column] = solved[index]
+    return dict(zip(kane._qdot, result, strict=True))
 
 
 def _homogeneous(kane: Any) -> bool:

@@ -80,9 +80,9 @@ class _Both:
         entries = tuple(values.ravel())
         leaves = {leaf: self._leaves.get(leaf.args[1]) or self.recorder.leaf(leaf.args[1], leaf.args[0])
                   for leaf in reachable([e for e in entries if isinstance(e, Node)]) if leaf.op == "leaf"}
-        found = np.empty(len(entries), dtype=object)
-        found[:] = substitute(entries, leaves, self.recorder)
-        return found.reshape(values.shape)
+        result = np.empty(len(entries), dtype=object)
+        result[:] = substitute(entries, leaves, self.recorder)
+        return result.reshape(values.shape)
 
     def _into_speeds(self, names: Sequence[str]) -> None:
         """The speeds of symdyn's equations in terms of SymPy's, and their change."""
@@ -97,12 +97,12 @@ class _Both:
         if used is None:
             raise ArgumentError(f"{eq.name}: the rates of the coordinates of SymPy's equations do not determine the speeds "
                                 f"{', '.join(map(str, eq.symbols.speeds))}; compare equations of the same coordinates")
-        found = SquareSystem(algebra, N[known][used], "the speeds do not follow from each other here").solve(right[used])
-        self.v = dict(zip(v, found, strict=True))
+        result = SquareSystem(algebra, N[known][used], "the speeds do not follow from each other here").solve(right[used])
+        self.v = dict(zip(v, result, strict=True))
         self.left = [(a, b) for a, b in zip(self.in_u(rates[known]), [self.rates[names[k]] for k in known], strict=True)]
         q = {eq.leaves[s]: self.rates[s.name] for s in eq.symbols.coordinates if s.name in self.rates}
         self.by_time = {**q, **given_by_time(eq.leaves)}
-        speeds = list(found)
+        speeds = list(result)
         self.Y = jacobian(recorder, speeds, self.u, "forward")
         self.change = vector(*forward(recorder, speeds, self.by_time))
 
@@ -116,9 +116,9 @@ class _Both:
 
     def in_u(self, values: np.ndarray) -> np.ndarray:
         """Quantities of symdyn's equations in the speeds of SymPy's."""
-        found = np.empty(values.size, dtype=object)
-        found[:] = substitute(tuple(values.ravel()), self.v, self.recorder)
-        return found.reshape(values.shape)
+        result = np.empty(values.size, dtype=object)
+        result[:] = substitute(tuple(values.ravel()), self.v, self.recorder)
+        return result.reshape(values.shape)
 
     def claims(self) -> list[tuple[str, list[tuple[Any, Any]], int]]:
         """What is to be the same: name, pairs, columns."""

@@ -208,16 +208,16 @@ class _Conversion:
         from sympy.physics.mechanics import Force, Vector
 
         source, N = self.source, self.source.frame
-        found: dict[Any, list[Any]] = {}
+        result: dict[Any, list[Any]] = {}
         for load in source.loads:
             body = next((b for b in source.bodies if isinstance(load, Force) and load.point == b.masscenter), None)
             if body is not None and body.mass != 0:
                 a = (load.force / body.mass).to_matrix(N).applyfunc(sp.cancel) if self._in(load.force, N) else None
                 mass = sp.sympify(body.mass, strict=True)
                 if a is not None and not functions_of_time(a) and not a.free_symbols & mass.free_symbols:
-                    found.setdefault(sp.ImmutableMatrix(a), []).append((body, load))
+                    result.setdefault(sp.ImmutableMatrix(a), []).append((body, load))
         moving = [b for b in source.bodies if getattr(b, "frame", None) != N and b.mass != 0]
-        for a, pairs in found.items():
+        for a, pairs in result.items():
             pulled = {id(body) for body, _ in pairs}
             if moving and {id(b) for b in moving} <= pulled and len(pulled) == len(pairs):
                 taken = [load for _, load in pairs]
@@ -272,8 +272,8 @@ class _Conversion:
         what = f"actuator {type(actuator).__name__}"
         pathway: Any = getattr(actuator, "pathway", None)
         ends = [self._carrier(point) for point in pathway.attachments] if type(pathway) is LinearPathway else []
-        found = [end for end in ends if end is not None]
-        if not isinstance(actuator, ForceActuator) or len(found) != 2 or found[0][0] is found[1][0]:
+        result = [end for end in ends if end is not None]
+        if not isinstance(actuator, ForceActuator) or len(result) != 2 or result[0][0] is result[1][0]:
             try:
                 loads = actuator.to_loads()
             except (NotImplementedError, ValueError) as error:
@@ -283,7 +283,7 @@ class _Conversion:
             for load in loads:
                 self._load(load, what)
         else:
-            (a, at_a), (b, at_b) = found
+            (a, at_a), (b, at_b) = result
             bodies, points = (a.body, b.body), (list(at_a), list(at_b))
             if type(actuator) is LinearSpring:
                 self.system.add_spring_damper(*bodies, *points, stiffness=self._take(what, actuator.stiffness),

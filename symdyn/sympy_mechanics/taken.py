@@ -55,11 +55,11 @@ class Taken:
         """A number or an expression; text, which is never evaluated, and anything else is a fault."""
         if not isinstance(value, str):
             try:
-                found = sp.sympify(value, strict=True)
+                result = sp.sympify(value, strict=True)
             except (sp.SympifyError, TypeError, ValueError):
-                found = None
-            if isinstance(found, sp.Expr):
-                return found
+                result = None
+            if isinstance(result, sp.Expr):
+                return result
         self.faults.append(f"{what} is {shown(value)}; pass a number or an expression of SymPy's")
         return sp.S.Zero
 
@@ -76,8 +76,8 @@ class Taken:
         """
         self._seen |= set(without)
         known = self.same if accelerations else {f: s for f, s in self.same.items() if s not in self.accelerations}
-        found = sorted(_leaves(expressions, self._seen, known), key=lambda e: (str(e), sp.default_sort_key(e)))
-        for e in found:
+        result = sorted(_leaves(expressions, self._seen, known), key=lambda e: (str(e), sp.default_sort_key(e)))
+        for e in result:
             if e in known or (e in self.same and isinstance(self.same[e], Input)):  # with a derivative that was found before
                 continue
             if isinstance(e, sp.Symbol):
@@ -102,8 +102,8 @@ class Taken:
         everything = [*self.coordinates, *self.speeds, *self.states, *self.parameters, *inputs]
         for name, count in Counter(s.name for s in everything).items():
             if count > 1:
-                found = " and ".join(described(s) for s in dict.fromkeys(everything) if s.name == name)
-                self.faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {found}; give "
+                result = " and ".join(described(s) for s in dict.fromkeys(everything) if s.name == name)
+                self.faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {result}; give "
                                    f"them different names")
             if not NAME.fullmatch(name):
                 self.faults.append(f"one of the symbols is named {shown(name)}; use letters, digits, spaces and _ . , : + - * / "
@@ -177,7 +177,7 @@ def _time() -> Any:
 
 def _leaves(expressions: Iterable[Any], seen: set[sp.Basic], known: Mapping[sp.Basic, Any]) -> set[sp.Basic]:
     """Symbols, functions without a value and derivatives in expressions and matrices; what was seen, or is known, is left out."""
-    found: set[sp.Basic] = set()
+    result: set[sp.Basic] = set()
     waiting = [part for e in expressions for part in (list(e) if isinstance(e, sp.MatrixBase) else [e])]
     while waiting:
         part = waiting.pop()
@@ -185,10 +185,10 @@ def _leaves(expressions: Iterable[Any], seen: set[sp.Basic], known: Mapping[sp.B
             continue
         seen.add(part)
         if isinstance(part, (sp.Symbol, AppliedUndef, sp.Derivative)):
-            found.add(part)
+            result.add(part)
         else:
             waiting.extend(part.args)
-    return found
+    return result
 
 
 def functions_of_time(*expressions: Any) -> set[sp.Basic]:

@@ -32,9 +32,9 @@ def balance(tape: Tape) -> Tape:
     recorder = tape.recorder
     asked = {name: o.entries for name, o in tape.outputs.items()}, len(recorder.names), len(recorder.checks)
     if recorder.balanced is not None and recorder.balanced[0] == asked:
-        found: Tape = recorder.balanced[1]
+        result: Tape = recorder.balanced[1]
         recorder.balanced = None
-        return found
+        return result
     balanced = _Balancer(tape).tape()
     recorder.balanced = asked, balanced
     return balanced

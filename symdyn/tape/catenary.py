@@ -28,7 +28,7 @@ import numpy as np
 from symdyn.tape.algorithms.catenary import SYMDYN_NEAREST, symdyn_line_force
 from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.differentiate import forward
-from symdyn.tape.kernels import Kernel
+from symdyn.tape.intrinsics import Intrinsic
 from symdyn.tape.node import STATE, Node, is_zero
 from symdyn.tape.passes import Again
 from symdyn.tape.recorder import Recorder
@@ -43,7 +43,7 @@ SMOOTH = Fraction(1, 10**12)
 
 
 @dataclass(frozen=True)
-class Catenary(Kernel):
+class Catenary(Intrinsic):
     """(h, v) of (x, z, e, C_B), for sizes (seabed,), 1 where there is one; see the module.
 
     It fails where x <= 1e-9 unless the line is slack, where z <= 0 over a seabed, and where e or C_B is negative.
@@ -64,12 +64,12 @@ class Catenary(Kernel):
         return 5 * 70
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        found, _ = symdyn_each(lambda line: symdyn_line_force(math, self.sizes[0], line, TINY, CLOSE), 2, values)
-        return np.moveaxis(np.array(found), 0, -1)
+        result, _ = symdyn_each(lambda line: symdyn_line_force(math, self.sizes[0], line, TINY, CLOSE), 2, values)
+        return np.moveaxis(np.array(result), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        found = symdyn_line_force(context, self.sizes[0], values, 4 * context.eps, context.sqrt(context.eps))
-        return [context.nan] * 2 if found is None else list(found)
+        result = symdyn_line_force(context, self.sizes[0], values, 4 * context.eps, context.sqrt(context.eps))
+        return [context.nan] * 2 if result is None else list(result)
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         leaves, steps, entries = _linearized(bool(self.sizes[0]), not is_zero(values[3]) or not is_zero(changes[3]))

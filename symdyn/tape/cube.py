@@ -12,7 +12,7 @@ import numpy as np
 from symdyn.errors import UnsupportedExpression
 from symdyn.tape.algorithms.cube import symdyn_cut_cube
 from symdyn.tape.algorithms.states import symdyn_each
-from symdyn.tape.kernels import Kernel
+from symdyn.tape.intrinsics import Intrinsic
 
 HIGHEST = 2
 # Gauss points of the unit interval: (1 -+ 1/sqrt(3))/2.
@@ -20,7 +20,7 @@ SHARES = 0.21132486540518713, 0.7886751345948129
 
 
 @dataclass(frozen=True)
-class Cube(Kernel):
+class Cube(Intrinsic):
     """Integrals over the wet part of the unit cube, |x|, |y|, |z| <= 1/2, for sizes (order,).
 
     Values: e, where the depth of a point r = (1, x, y, z) below the water is e.r = e0 + e1 x + e2 y + e3 z.
@@ -60,13 +60,13 @@ class Cube(Kernel):
         return (150, 150, 450)[self.sizes[0]]
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        found, _ = symdyn_each(lambda e: symdyn_cut_cube(self.sizes[0], e, 1.0, SHARES), self.n_out, values)
-        return np.moveaxis(np.array(found), 0, -1)
+        result, _ = symdyn_each(lambda e: symdyn_cut_cube(self.sizes[0], e, 1.0, SHARES), self.n_out, values)
+        return np.moveaxis(np.array(result), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
         one, root = context.mpf(1), 1 / context.sqrt(3)
-        found = symdyn_cut_cube(self.sizes[0], values, one, ((1 - root) / 2, (1 + root) / 2))
-        return [context.nan] * self.n_out if found is None else found
+        result = symdyn_cut_cube(self.sizes[0], values, one, ((1 - root) / 2, (1 + root) / 2))
+        return [context.nan] * self.n_out if result is None else result
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         if self.sizes[0] == HIGHEST:

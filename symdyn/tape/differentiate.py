@@ -57,11 +57,11 @@ def seed_name(name: str) -> str:
 
 def _call(recorder: Recorder, node: Node, tangent: dict[Any, Any]) -> None:
     """The derivatives of a numeric algorithm's results, as a list, unless nothing in it moves."""
-    kernel, *values = node.args
+    intrinsic, *values = node.args
     changes = [tangent.get(v, 0) if isinstance(v, Node) else 0 for v in values]
     if not all(map(is_zero, changes)):
-        results = [recorder.item(node, k) for k in range(kernel.n_out)]
-        tangent[node] = kernel.tangents(recorder, values, results, changes)
+        results = [recorder.item(node, k) for k in range(intrinsic.n_out)]
+        tangent[node] = intrinsic.tangents(recorder, values, results, changes)
 
 
 def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
@@ -99,14 +99,14 @@ def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
 
 def _back_through(recorder: Recorder, node: Node, active: set[Node], adjoint: dict[Node, Any]) -> None:
     """From the adjoints of a call's results to those of its values, by its derivatives one value at a time."""
-    kernel, *values = node.args
-    results = [recorder.item(node, k) for k in range(kernel.n_out)]
+    intrinsic, *values = node.args
+    results = [recorder.item(node, k) for k in range(intrinsic.n_out)]
     bars = [adjoint.get(result, 0) for result in results]
     if all(map(is_zero, bars)):
         return
     for a in dict.fromkeys(v for v in values if isinstance(v, Node) and v in active):
         changes = [int(v is a) for v in values]
-        for bar, slope in zip(bars, kernel.tangents(recorder, values, results, changes), strict=True):
+        for bar, slope in zip(bars, intrinsic.tangents(recorder, values, results, changes), strict=True):
             adjoint[a] = adjoint.get(a, 0) + bar * slope
 
 

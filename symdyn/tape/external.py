@@ -13,12 +13,12 @@ import sympy as sp
 from sympy.core.function import FunctionClass
 
 from symdyn.errors import UnsupportedExpression
-from symdyn.tape.kernels import Kernel
+from symdyn.tape.intrinsics import Intrinsic
 from symdyn.tape.node import is_zero
 
 
 @dataclass(frozen=True, kw_only=True)
-class UserFunction(Kernel):
+class UserFunction(Intrinsic):
     """What symdyn.External makes; two with the same text are the same.
 
     label, arguments, results   its name, names of its arguments, number of its results
@@ -65,9 +65,9 @@ class UserFunction(Kernel):
         shape = np.broadcast_shapes(*[np.shape(v) for v in values])
         arrays = [np.broadcast_to(np.asarray(v, dtype=float), shape).ravel() for v in values]
         with np.errstate(all="ignore"):
-            found = self.numbers(*arrays)
-        several = isinstance(found, (tuple, list)) or np.ndim(found) > 1
-        results = list(found) if self.results > 1 and several else [found]
+            result = self.numbers(*arrays)
+        several = isinstance(result, (tuple, list)) or np.ndim(result) > 1
+        results = list(result) if self.results > 1 and several else [result]
         if len(results) != self.results:
             raise UnsupportedExpression(f"{self.signature} must return {_arrays(self.results)}; its Python function returned "
                                         f"{len(results)}")
@@ -85,10 +85,10 @@ class UserFunction(Kernel):
                 return [context.nan] * self.results
             return [context.mpf(float(v)) for v in self.rows([float(v) for v in values])]
         try:
-            found = self.digits(context, *values)
+            result = self.digits(context, *values)
         except (ArithmeticError, ValueError):
             return [context.nan] * self.results
-        results = list(found) if isinstance(found, (tuple, list)) else [found]
+        results = list(result) if isinstance(result, (tuple, list)) else [result]
         if len(results) != self.results:
             raise UnsupportedExpression(f"{self.signature} must return {_numbers(self.results)}; its function `precise` returned "
                                         f"{len(results)}")
@@ -119,22 +119,22 @@ class UserFunction(Kernel):
         """For each result the SymPy function that stands for it."""
         many = self.results > 1
         return tuple(FunctionClass(f"{self.label}_{k + 1}" if many else self.label, (Result,),
-                                   {"nargs": len(self.arguments), "kernel": self, "place": k})
+                                   {"nargs": len(self.arguments), "intrinsic": self, "place": k})
                      for k in range(self.results))
 
     def applied(self, arguments: Sequence[Any]) -> list[sp.Expr]:
         """Its results at these arguments, as SymPy expressions."""
         return [function(*arguments) for function in self.functions]
 
-    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+    def slope(self, index: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
         """The derivative of one result by its argument number k, from 0."""
-        return self._derivative().functions[place * len(arguments) + k](*arguments)
+        return self._derivative().functions[index * len(arguments) + k](*arguments)
 
 
 class Result(sp.Function):
-    """One result of a function of the user; `kernel` is the function, `place` counts its results from 0."""
+    """One result of a function of the user; `intrinsic` is the function, `place` counts its results from 0."""
 
-    kernel: UserFunction
+    intrinsic: UserFunction
     place: int
     is_real = True
 
@@ -143,18 +143,18 @@ class Result(sp.Function):
         return -1  # a number among the arguments does not make a number of it
 
     def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
-        return _result_at, (self.kernel, self.place, self.args)
+        return _result_at, (self.intrinsic, self.place, self.args)
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """The derivative by an argument, counted from 1."""
-        return self.kernel.slope(self.place, argindex - 1, self.args)
+        return self.intrinsic.slope(self.place, argindex - 1, self.args)
 
     def _eval_evalf(self, prec: int) -> Any:
         """Its number where all arguments are numbers."""
-        if (self.kernel.digits or self.kernel.numbers) is None or not all(a.is_number and a.is_real for a in self.args):
+        if (self.intrinsic.digits or self.intrinsic.numbers) is None or not all(a.is_number and a.is_real for a in self.args):
             return None
         with mpmath.workprec(prec + 5):
-            value = self.kernel.precise(mpmath.mp, [a._to_mpmath(prec + 5, allow_ints=False) for a in self.args])[self.place]
+            value = self.intrinsic.precise(mpmath.mp, [a._to_mpmath(prec + 5, allow_ints=False) for a in self.args])[self.place]
             return sp.Expr._from_mpmath(value, prec) if mpmath.isfinite(value) else None
 
     def _sympystr(self, printer: Any) -> str:
@@ -169,8 +169,8 @@ class Result(sp.Function):
         return printer._print_Function(self)
 
 
-def _result_at(kernel: UserFunction, place: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
-    return kernel.functions[place](*arguments)
+def _result_at(intrinsic: UserFunction, index: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+    return intrinsic.functions[index](*arguments)
 
 
 def _arrays(n: int) -> str:

@@ -82,8 +82,8 @@ def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node,
     steps = reachable(entries)
     known = {node: leaves[node] if node in leaves else _still(node) for node in steps
              if node in leaves or not node.mask & ~PARAMETER}
-    found = walk(steps, _Intervals(recorder, rounded), known)
-    return [found.of(entry) for entry in entries]
+    result = walk(steps, _Intervals(recorder, rounded), known)
+    return [result.of(entry) for entry in entries]
 
 
 def _still(value: Any) -> Jet:

@@ -34,7 +34,7 @@ class Jump(NamedTuple):
 
 def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
     """Where these entries may jump along a motion, each surface once; kinks, of abs, min and max, do not count."""
-    found: dict[Any, Jump] = {}
+    result: dict[Any, Jump] = {}
     for node in reachable(entries):
         if not node.mask & _MOVING:
             continue
@@ -53,19 +53,19 @@ def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
             continue
         if isinstance(surface, Node):
             opposite = surface.args[0] if surface.op == "neg" else recorder.neg(surface)
-            if surface not in found and opposite not in found:
-                found[surface] = Jump(surface, node, smooth)
-    return list(found.values())
+            if surface not in result and opposite not in result:
+                result[surface] = Jump(surface, node, smooth)
+    return list(result.values())
 
 
 def breaks(recorder: Recorder, entries: Sequence[Any]) -> list[Any]:
     """What passes zero along a motion where these entries have a kink or a jump, each surface once."""
-    found: dict[Any, None] = {}
+    result: dict[Any, None] = {}
     for node in reachable(entries):
         if node.mask & _MOVING and node.op in _BENT:
-            found[node.args[0] if node.op == "abs" else recorder.sub(*node.args)] = None
-    found |= dict.fromkeys(jump.surface for jump in jumps(recorder, entries))
-    return [surface for surface in found if isinstance(surface, Node)]
+            result[node.args[0] if node.op == "abs" else recorder.sub(*node.args)] = None
+    result |= dict.fromkeys(jump.surface for jump in jumps(recorder, entries))
+    return [surface for surface in result if isinstance(surface, Node)]
 
 
 def _direction(denominator: Any) -> Any:

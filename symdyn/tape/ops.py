@@ -17,7 +17,7 @@ Partials = Callable[[Any, Any, tuple], tuple]
 class Operation:
     """One row of the table.
 
-    kind       what it counts as: add, mul, div, sqrt, trig, function, compare, kernel (see symdyn.tape.kernels) or free
+    kind       what it counts as: add, mul, div, sqrt, trig, function, compare, intrinsic (see symdyn.tape.intrinsics) or free
     partials   (recorder, result, arguments) -> derivative by each argument; None where it is zero everywhere
     name       its name in NumPy's and mpmath's vocabulary (`numpy`, `mpmath`) and SymPy's (`sympy`)
     """
@@ -79,7 +79,7 @@ OPERATIONS: dict[str, Operation] = {
     "select": Operation("compare", lambda r, y, a: (0, r.apply("select", a[0], 1, 0), r.apply("select", a[0], 0, 1)),
                         "where", "select", "Piecewise"),
     "guard": Operation("free", lambda r, y, a: (1, 0), "", "", ""),
-    "call": Operation("kernel", None, "", "", ""),
+    "call": Operation("intrinsic", None, "", "", ""),
     "item": Operation("free", None, "", "", ""),
     "pi": Operation("free", None, "pi", "pi", "pi"),
 }

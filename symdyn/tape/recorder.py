@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.shown import shown
-from symdyn.tape.kernels import Kernel
+from symdyn.tape.intrinsics import Intrinsic
 from symdyn.tape.node import Node, exact
 from symdyn.tape.ops import OPERATIONS
 
@@ -271,23 +271,23 @@ class Recorder:
             raise ValueError(f"unknown operation {shown(op)}; known: {', '.join(OPERATIONS)}")
         return self._record(op, *args)
 
-    def call(self, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
+    def call(self, intrinsic: Intrinsic, values: Sequence[Any]) -> list[Any]:
         """The results of a numeric algorithm."""
         taken = [v if isinstance(v, Node) else exact(v) for v in values]
         if not any(isinstance(v, Node) and v.mask for v in taken):
-            return self._called(kernel, taken)
-        node = self._record("call", kernel, *taken)
-        self.checks.setdefault(node, kernel.reason)
-        return [self._record("item", node, k) for k in range(kernel.n_out)]
+            return self._called(intrinsic, taken)
+        node = self._record("call", intrinsic, *taken)
+        self.checks.setdefault(node, intrinsic.reason)
+        return [self._record("item", node, k) for k in range(intrinsic.n_out)]
 
     @staticmethod
-    def _called(kernel: Kernel, values: Sequence[Any]) -> list[Any]:
+    def _called(intrinsic: Intrinsic, values: Sequence[Any]) -> list[Any]:
         """The results for numbers and for nodes without inputs, such as sqrt(2)."""
         from symdyn.tape.evaluate import constant
 
-        results = [float(v) for v in kernel.rows([constant(v) for v in values])]
+        results = [float(v) for v in intrinsic.rows([constant(v) for v in values])]
         if not all(map(math.isfinite, results)):
-            raise ZeroDivisionError(kernel.reason)
+            raise ZeroDivisionError(intrinsic.reason)
         return [exact(v) for v in results]
 
     def item(self, results: Any, k: int) -> Any:

@@ -85,7 +85,7 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
                 return recorder.apply("exp", take(e.exp))
             return recorder.pow(take(e.base), take(e.exp))
         if isinstance(e, Result):
-            return recorder.call(e.kernel, [take(a) for a in e.args])[e.place]
+            return recorder.call(e.intrinsic, [take(a) for a in e.args])[e.place]
         if isinstance(e, sp.Piecewise):
             return piecewise(e)
         if isinstance(e, sp.UnevaluatedExpr):
@@ -165,13 +165,13 @@ class _Explicit(Arithmetic):
         return args[0] if node.op == "guard" else applied(node.op, args)
 
     def call(self, node: Node, args: list[Any]) -> Any:
-        kernel = node.args[0]
-        if isinstance(kernel, UserFunction):
-            return kernel.applied(args)
-        if not kernel.letters:
+        intrinsic = node.args[0]
+        if isinstance(intrinsic, UserFunction):
+            return intrinsic.applied(args)
+        if not intrinsic.letters:
             raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
                                         "the right side instead")
-        return [sp.Function(letter)(*args) for letter in kernel.letters]
+        return [sp.Function(letter)(*args) for letter in intrinsic.letters]
 
 
 # Powers of two that floats reach, above and below one, and some less.

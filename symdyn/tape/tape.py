@@ -163,7 +163,7 @@ def count_of(nodes: Iterable[Node]) -> dict[str, int]:
     counter: Counter[str] = Counter()
     for op, n in Counter([node.op for node in nodes]).items():
         counter[OPERATIONS[op].kind] += n
-    if counter["kernel"]:
-        counter["kernel"] = sum(node.args[0].operations for node in nodes if node.op == "call")
+    if counter["intrinsic"]:
+        counter["intrinsic"] = sum(node.args[0].operations for node in nodes if node.op == "call")
     counter.pop("free", None)
     return dict(sorted(counter.items()))

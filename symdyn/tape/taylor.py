@@ -65,8 +65,8 @@ def series(recorder: Recorder, field: Sequence[Any], state: Sequence[str]) -> Se
 
 def not_smooth(entries: Sequence[Any]) -> str:
     """Why these have no Taylor series along a motion; empty if they have."""
-    found = dict.fromkeys(_WHY[n.op] for n in reachable(entries) if n.op in _WHY and _moves(n))
-    return f"the right-hand side {' and '.join(found)}" if found else ""
+    result = dict.fromkeys(_WHY[n.op] for n in reachable(entries) if n.op in _WHY and _moves(n))
+    return f"the right-hand side {' and '.join(result)}" if result else ""
 
 
 class _Recurrences:
@@ -95,14 +95,14 @@ class _Recurrences:
         used = set(reachable(entries))
         kept = {node: leaf for node, leaf in self.kept.items() if leaf in used}
         for group, leaves in (("u", factors), ("z", kept.values())):
-            self.places |= {leaf.args[1]: (group, place) for place, leaf in enumerate(leaves)}
+            self.places |= {leaf.args[1]: (group, index) for index, leaf in enumerate(leaves)}
         start = Tape.of(self.r, series_start=np.array([*field, *kept], dtype=object))
         following = Tape.of(self.r, series_next=np.array(entries, dtype=object))
         return Series(start, following, self.places, len(rates), len(kept), len(factors))
 
-    def _leaf(self, group: str, mask: int, place: int) -> Node:
-        name = f"series {group}{place + 1}"  # no name that a user can give
-        self.places[name] = (group, place)
+    def _leaf(self, group: str, mask: int, index: int) -> Node:
+        name = f"series {group}{index + 1}"  # no name that a user can give
+        self.places[name] = (group, index)
         return self.r.leaf(name, mask)
 
     # -- what the rules are made of

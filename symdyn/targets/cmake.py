@@ -63,7 +63,7 @@ def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
                                          undefined=jinja2.StrictUndefined, lstrip_blocks=True, keep_trailing_newline=True)
         text = environment.get_template("README.md.jinja").render(
             name=metadata.name, version=symdyn.__version__, formulation=metadata.formulation, sizes=metadata.sizes,
-            stacks=sorted(stacks.items()), stack_compiler=compiler, kernels=source.program.kernels,
+            stacks=sorted(stacks.items()), stack_compiler=compiler, intrinsics=source.program.intrinsics,
             deepest=deepest(folder / "src" / f"{metadata.name}.c", stacks) if stacks else 0)
         written.append(folder / "README.md")
         written[-1].write_text(text, encoding="utf-8")
@@ -75,10 +75,10 @@ def stack_of(folder: Path, name: str, command: tuple[str, ...] | None = None) ->
 
     command   the compiler with its options; default: the one of this machine
     """
-    found = find_compiler()
-    if command is None and (found is None or found.kind != "gcc"):
+    result = find_compiler()
+    if command is None and (result is None or result.kind != "gcc"):
         return {}, ""
-    used = command if command is not None or found is None else found.command
+    used = command if command is not None or result is None else result.command
     assert used is not None
     with tempfile.TemporaryDirectory(prefix="stack-") as scratch:
         done = subprocess.run([*used, "-std=c99", "-O2", "-ffp-contract=off", "-fno-inline", "-fstack-usage", "-I",

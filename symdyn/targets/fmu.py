@@ -176,9 +176,9 @@ def _wrapped(of_code: Any, metadata: ModuleMetadata, n_outputs: int, derivatives
 
     computed = [n for n in ("outputs", "energy") if n in of_code.shapes]
     sizes = {n: int(np.prod(of_code.shapes[n])) for n in computed}
-    found = [Wrapped("rhs", "x_dot", (call("rhs"),)),
-             Wrapped("outputs", "Outputs, then energies.",
-                     tuple(call(n, sum(sizes[m] for m in computed[:k])) for k, n in enumerate(computed)))]
+    result = [Wrapped("rhs", "x_dot", (call("rhs"),)),
+              Wrapped("outputs", "Outputs, then energies.",
+                      tuple(call(n, sum(sizes[m] for m in computed[:k])) for k, n in enumerate(computed)))]
     for by, n in (("x", n_x), ("inputs", len(metadata.inputs)), ("params", len(metadata.parameters))):
         calls, first = [], 0
         for of, size in (("rhs", n_x), *sizes.items()):
@@ -186,10 +186,10 @@ def _wrapped(of_code: Any, metadata: ModuleMetadata, n_outputs: int, derivatives
             if name in derivatives:
                 calls.append(call(name, first))
             first += size * n
-        found.append(Wrapped(f"by_{'p' if by == 'params' else by}",
-                             f"Derivatives of x_dot, of outputs and energies by {by}, row by row.", tuple(calls)))
-    found += [Wrapped(n, "", (call(n),)) for n in ("length", VIOLATION, "events") if n in of_code.shapes]
-    return found
+        result.append(Wrapped(f"by_{'p' if by == 'params' else by}",
+                              f"Derivatives of x_dot, of outputs and energies by {by}, row by row.", tuple(calls)))
+    result += [Wrapped(n, "", (call(n),)) for n in ("length", VIOLATION, "events") if n in of_code.shapes]
+    return result
 
 
 def _binary(owner: str, name: str, files: Mapping[str, bytes], version: int, compiler: Compiler) -> dict[str, bytes]:

@@ -87,14 +87,14 @@ class References:
 
 def output_names(metadata: ModuleMetadata) -> list[tuple[str, str]]:
     """Names and units of the entries of the outputs, entries counted from 1, then of the energies where there are some."""
-    found = []
+    result = []
     for name, shape in metadata.outputs:
         unit = metadata.output_units.get(name, "")
         if not shape:
-            found.append((name, unit))
+            result.append((name, unit))
         for place in product(*(range(1, n + 1) for n in shape)) if shape else ():
-            found.append((f"{name}[{','.join(map(str, place))}]", unit))
-    return found + ([(name, "J") for name in ENERGIES] if "energy" in metadata.functions else [])
+            result.append((f"{name}[{','.join(map(str, place))}]", unit))
+    return result + ([(name, "J") for name in ENERGIES] if "energy" in metadata.functions else [])
 
 
 def variables_of(metadata: ModuleMetadata, start: Mapping[str, np.ndarray]) -> tuple[list[Variable], References]:
@@ -141,9 +141,9 @@ def rate_unit(unit: str) -> str:
 
 def units_of(variables: Sequence[Variable]) -> tuple[list[FmuUnit], list[Variable]]:
     """The units that occur, and the variables without those that are not known, which stay in the descriptions."""
-    found: dict[str, FmuUnit | None] = {name: _unit(name) for name in dict.fromkeys(v.unit for v in variables if v.unit)}
-    kept = [v if not v.unit or found[v.unit] else _without_unit(v) for v in variables]
-    return [unit for unit in found.values() if unit is not None], kept
+    result: dict[str, FmuUnit | None] = {name: _unit(name) for name in dict.fromkeys(v.unit for v in variables if v.unit)}
+    kept = [v if not v.unit or result[v.unit] else _without_unit(v) for v in variables]
+    return [unit for unit in result.values() if unit is not None], kept
 
 
 def _without_unit(variable: Variable) -> Variable:
@@ -187,7 +187,7 @@ def unknowns_of(metadata: ModuleMetadata, at: References, structure: Callable[[s
     first = at.outputs
     for name in ("outputs", "energy"):
         if name in arguments:
-            found = rows(name, {group: f"{name}_by_{group}" for group in ("x", "inputs")}, first)
-            outputs += found
-            first += len(found)
+            result = rows(name, {group: f"{name}_by_{group}" for group in ("x", "inputs")}, first)
+            outputs += result
+            first += len(result)
     return outputs, rows("rhs", {"x": "jacobian_x", "inputs": "jacobian_inputs"}, at.rates)

@@ -20,7 +20,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.pipeline import compile_equations
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 from symdyn.targets.functions import library
 
 _TARGET = "symdyn_rows"
@@ -39,12 +39,12 @@ def through_library(equations: Equations, name: str, module: ModuleType,
 
     @functools.cache
     def core(wanted: str) -> Callable[..., Any]:
-        unit = compiled.unit(wanted)
-        assert isinstance(unit, CUnit)
+        library = compiled.library(wanted)
+        assert isinstance(library, CLibrary)
         shape = tuple(module.METADATA["shapes"][wanted])
-        attributes = {"rows": _address(unit.function(f"{wanted}_rows")), "prologue": _address(unit.function("prologue")),
-                      "n_c": np.int64(unit.metadata.n_c), "inner": np.int64(len(shape))}
-        n_ud = unit.metadata.sizes.ud
+        attributes = {"rows": _address(library.function(f"{wanted}_rows")), "prologue": _address(library.function("prologue")),
+                      "n_c": np.int64(library.metadata.n_c), "inner": np.int64(len(shape))}
+        n_ud = library.metadata.sizes.ud
 
         def called(t: Any, x: Any, params: Any, inputs: Any, ud: Any) -> Any:
             call = jax.ffi.ffi_call(_TARGET, jax.ShapeDtypeStruct(shape, x.dtype), vmap_method="expand_dims")

@@ -37,7 +37,7 @@ from symdyn.functions.tapes import has_function
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path, writing
 from symdyn.tape.external import UserFunction
-from symdyn.tape.kernels import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
+from symdyn.tape.intrinsics import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Tape
 from symdyn.targets.modelica_equations import Flat, combined
 from symdyn.targets.start import equations_of, start_values
@@ -141,13 +141,13 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
     events = [variable_name(f"event_{e.name}", taken) for e in metadata.events]
     flat = Flat(dialect, whole, identifiers, taken, codes).equations()
     reasons = {f"reasons[{code}]": f'"{_quoted(reason)}"' for reason, code in codes.items()}
-    asserts = [re.sub(r"reasons\[\d+\]", lambda found: reasons[found[0]], line) for line in flat.asserts]
-    kernels = {n.args[0].name for n in tape.steps if n.op == "call" and not isinstance(n.args[0], UserFunction)}
+    asserts = [re.sub(r"reasons\[\d+\]", lambda result: reasons[result[0]], line) for line in flat.asserts]
+    intrinsics = {n.args[0].name for n in tape.steps if n.op == "call" and not isinstance(n.args[0], UserFunction)}
     user_texts = texts_of_user_functions(called(tape), FOLDER, name)
     x = [identifiers[n] for n in metadata.x]
     values, residuals = _entries_of(outputs), flat.results.get(VIOLATION, ())
     body = repr(flat) + repr(user_texts)
-    _check_kernels(content.name, kernels)
+    _check_intrinsics(content.name, intrinsics)
     context = {
         "name": name, "title": _quoted(f"{metadata.formulation} equations of motion of {metadata.name}"),
         "version": symdyn.__version__, "hash": hashlib.sha256(body.encode()).hexdigest()[:16],
@@ -171,7 +171,7 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
             _Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),
             _Violation("violation_rate", "m/s", "rate of a violation", _moving(residuals[len(residuals) // 2:]))) if v.residuals],
         "length": flat.results.get("length", ("1",))[0], "violated": VIOLATED,
-        "kernels": sorted(kernels), "user_texts": user_texts,
+        "intrinsics": sorted(intrinsics), "user_texts": user_texts,
         "own": [f for f in _OWN_FUNCTIONS if f"{f}(" in body],
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "samples": _samples(metadata, content, identifiers, values, start)}
@@ -180,12 +180,12 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
 
 def variable_name(name: str, taken: set[str]) -> str:
     """A name as it is, as far as it is none of Modelica's and not taken; adds it to `taken`."""
-    found = re.sub(r"\W", "_", name, flags=re.ASCII)
-    found = f"v{found}" if not found or found[0].isdigit() else found
-    while found in taken:
-        found += "_"
-    taken.add(found)
-    return found
+    result = re.sub(r"\W", "_", name, flags=re.ASCII)
+    result = f"v{result}" if not result or result[0].isdigit() else result
+    while result in taken:
+        result += "_"
+    taken.add(result)
+    return result
 
 
 def _moving(residuals: Sequence[str]) -> tuple[str, ...]:
@@ -193,10 +193,10 @@ def _moving(residuals: Sequence[str]) -> tuple[str, ...]:
     return tuple(r for r in residuals if r != "0.0")
 
 
-def _check_kernels(owner: str, kernels: set[str]) -> None:
+def _check_intrinsics(owner: str, intrinsics: set[str]) -> None:
     """Raise UnsupportedExpression for a numeric algorithm without a text in Modelica."""
     known = {path.name.partition(".")[0] for path in (templates_folder() / FOLDER).glob("symdyn_*.jinja")}
-    missing = sorted(kernels - known)
+    missing = sorted(intrinsics - known)
     if missing:
         raise UnsupportedExpression(f"{owner} calls the numeric algorithm {missing[0]}, by sd.Buoyancy or sd.MooringLine, and "
                                     "there is no text of it in Modelica; take an FMU, which has it in C, or model the load by "
@@ -239,13 +239,13 @@ def _states(metadata: ModuleMetadata, identifiers: Mapping[str, str], values: np
 
 
 def _outputs(outputs: Sequence[tuple[str, tuple[int, ...], str]], energy: bool) -> list[Variable]:
-    found = []
+    result = []
     for name, shape, unit in outputs:
         variable = _real(name, unit, "output")
         size = f"[{', '.join(map(str, shape))}]" if shape else ""
         attributes = variable.attributes.replace("(unit", "(each unit") if shape else variable.attributes
-        found.append(variable._replace(name=f"{name}{size}", attributes=attributes))
-    return found + [_real(f"{kind}_energy", "J", f"{kind} energy") for kind in ("kinetic", "potential") if energy]
+        result.append(variable._replace(name=f"{name}{size}", attributes=attributes))
+    return result + [_real(f"{kind}_energy", "J", f"{kind} energy") for kind in ("kinetic", "potential") if energy]
 
 
 def _entries_of(outputs: Sequence[tuple[str, tuple[int, ...], str]]) -> list[str]:
@@ -286,9 +286,10 @@ def _condition(event: EventRecord, value: str) -> str:
     return rising if event.direction > 0 else falling if event.direction < 0 else f"{{{rising}, {falling}}}"
 
 
-def _within(watch: ValidityRange, value: str) -> list[str]:
+def _within(validity: ValidityRange, value: str) -> list[str]:
     """The conditions that a value is in its range, which may be open."""
-    return [f"{value} {sign} {bound!r}" for sign, bound in ((">=", watch.least), ("<=", watch.most)) if math.isfinite(bound)]
+    bounds = (">=", validity.least), ("<=", validity.most)
+    return [f"{value} {sign} {bound!r}" for sign, bound in bounds if math.isfinite(bound)]
 
 
 def _message(message: str, value: str) -> str:
@@ -326,12 +327,12 @@ def _samples(metadata: ModuleMetadata, content: Content, identifiers: Mapping[st
 
 def _claims(content: Content, function: str, variables: Sequence[str], values: Mapping[str, float]) -> list[tuple[str, str]]:
     """What a function gives at a state, where it is defined there."""
-    tapes: list[Tape | None] = [content.tapes.get(function), content.otherwise.get(function)]
+    tapes: list[Tape | None] = [content.tapes.get(function), content.singular_fallback.get(function)]
     for tape in tapes:
-        found = result_at(function, tape, values, "") if tape is not None else None
-        if found is not None and float(found.tolerance) <= COARSEST:
-            largest = max((abs(float(v)) for v in found.values), default=0.0) or 1.0
-            allowed = f"{100 * float(found.tolerance) * largest:.0e}"
+        result = result_at(function, tape, values, "") if tape is not None else None
+        if result is not None and float(result.tolerance) <= COARSEST:
+            largest = max((abs(float(v)) for v in result.values), default=0.0) or 1.0
+            allowed = f"{100 * float(result.tolerance) * largest:.0e}"
             return [(f"abs({variable} - ({value})) <= {allowed}", _quoted(f"{variable} is not {value}"))
-                    for variable, value in zip(variables, found.values, strict=True)]
+                    for variable, value in zip(variables, result.values, strict=True)]
     return []

@@ -88,7 +88,7 @@ class Combined(NamedTuple):
 def combined(content: Content, names: Sequence[str]) -> Combined:
     """The named functions as one tape."""
     recorder = content.tapes["rhs"].recorder
-    regular = {n: _entries(content.tapes[n]) for n in names if n in content.otherwise}
+    regular = {n: _entries(content.tapes[n]) for n in names if n in content.singular_fallback}
     guarded = _Guarded(content.tapes["rhs"])
     made = walk(reachable(e for entries in regular.values() for e in entries), guarded)
     holds: Any = 1
@@ -104,7 +104,7 @@ def combined(content: Content, names: Sequence[str]) -> Combined:
         entries = _entries(tape)
         if n in regular:
             entries = tuple(recorder.apply("select", chosen, made.of(a), b)
-                            for a, b in zip(entries, _entries(content.otherwise[n]), strict=True))
+                            for a, b in zip(entries, _entries(content.singular_fallback[n]), strict=True))
         outputs[n] = Output(n, next(iter(tape.outputs.values())).shape, entries)
     always = {n for n in reachable([e for n in names if n not in regular for e in _entries(content.tapes[n])]
                                    + [made.of(e) for entries in regular.values() for e in entries]) if n.op == "call"}

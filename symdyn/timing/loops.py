@@ -14,7 +14,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.pipeline import emit
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 
 if TYPE_CHECKING:
     from symdyn.given import Rolling
@@ -70,11 +70,11 @@ def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 
     call = ", ".join([*[places[g] for g in function.arguments], "frame->out"])
     text = next(iter(source.files.values())) + _LOOP.format(
         name=metadata.name, function=name, call=call, last=sizes.x - 1 if last is None else last)
-    unit = CUnit(text, metadata, require_compiler())
-    evaluator = unit.evaluator(name)
+    library = CLibrary(text, metadata, require_compiler())
+    evaluator = library.evaluator(name)
     evaluator.set_params(np.array([0.5 + 0.01 * k if v is None else v for k, v in enumerate(metadata.defaults)]))
     evaluator.x[:] = 0.1 + 0.01 * np.arange(sizes.x) if x is None else x
-    return Loop(evaluator, unit.function("loop"), fed)
+    return Loop(evaluator, library.function("loop"), fed)
 
 
 def best_times(runs: Sequence[Callable[[int], None]], repeats: int, loops: int | None = None) -> list[float]:

@@ -50,5 +50,5 @@ def _demand_whole(loop: Loop, equations: Equations) -> None:
     code = loop.evaluator.call(loop.evaluator.address)
     if code > 0:
         raise EvaluationError(f"{equations.name} was to be timed in its {equations.formulation} form, but "
-                              f"{loop.evaluator.unit.reason(code)}; give all parameters numbers that make sense, in the "
+                              f"{loop.evaluator.library.reason(code)}; give all parameters numbers that make sense, in the "
                               "defaults of the system")

@@ -42,7 +42,7 @@ def angles(R: Rows) -> Triple:
         first = math.atan2(-R[1][2], R[1][1]), pitch, 0.0
     roll, pitch, yaw = first
     other = roll - math.copysign(math.pi, roll), math.copysign(math.pi, pitch) - pitch, yaw - math.copysign(math.pi, yaw)
-    return next((found for start in (first, other) for found in _exact(R, start)), first)
+    return next((result for start in (first, other) for result in _exact(R, start)), first)
 
 
 def _exact(R: Rows, start: Triple) -> Iterator[Triple]:
@@ -60,13 +60,13 @@ def _exact(R: Rows, start: Triple) -> Iterator[Triple]:
 
 def _near(angle: float) -> list[float]:
     """The angle, or a whole turn more or less, with one digit, with two, ..., in steps of 15 degrees, and the floats around."""
-    found = []
+    result = []
     for whole in (angle, angle + 2 * math.pi, angle - 2 * math.pi):
-        found += [float(f"{whole:.{digits}g}") for digits in range(1, 18)]
-    found.append(math.radians(15 * round(angle / math.radians(15))))
+        result += [float(f"{whole:.{digits}g}") for digits in range(1, 18)]
+    result.append(math.radians(15 * round(angle / math.radians(15))))
     for direction in (-math.inf, math.inf):
         neighbour = angle
         for _ in range(4):
             neighbour = math.nextafter(neighbour, direction)
-            found.append(neighbour)
-    return [c for c in dict.fromkeys(found) if abs(math.remainder(c - angle, 2 * math.pi)) < 1e-11]
+            result.append(neighbour)
+    return [c for c in dict.fromkeys(result) if abs(math.remainder(c - angle, 2 * math.pi)) < 1e-11]

@@ -25,8 +25,8 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
         hanging.setdefault(joint.parent, []).append(joint)
     roots = [name for name in robot.links if name not in carrying]
     if len(roots) > 1 and not robot.dropped:  # one that was dropped may carry the other
-        found = ", ".join(f"{name!r} (line {robot.links[name].line})" for name in roots)
-        faults.at(robot.links[roots[1]].line, f"{len(roots)} links are the child of no joint: {found}; join all but one to the "
+        result = ", ".join(f"{name!r} (line {robot.links[name].line})" for name in roots)
+        faults.at(robot.links[roots[1]].line, f"{len(roots)} links are the child of no joint: {result}; join all but one to the "
                                               "rest")
     order: list[UrdfJoint] = []
     waiting = [joint for root in roots for joint in hanging.get(root, [])][::-1]
@@ -45,7 +45,7 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
 def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str, tuple[str, float, float]]:
     """For each joint that mimics: the joint whose coordinate q it follows in the end, "" if that does not move it; its
     coordinate is multiplier q + offset. Joints that are held are at zero, and follow none."""
-    found: dict[str, tuple[str, float, float]] = {}
+    result: dict[str, tuple[str, float, float]] = {}
     for joint in robot.joints.values():
         source, multiplier, offset, passed = joint, 1.0, 0.0, [joint.name]
         while source.mimic is not None and source.name not in held:
@@ -76,5 +76,5 @@ def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str
                       "smaller ones")
         elif joint.mimic is not None and joint.name not in held:
             idle = source.kind == "fixed" or source.name in held or multiplier == 0
-            found[joint.name] = ("" if idle else source.name, multiplier, offset)
-    return found
+            result[joint.name] = ("" if idle else source.name, multiplier, offset)
+    return result

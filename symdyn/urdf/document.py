@@ -119,9 +119,10 @@ def _no_xml(reason: str, text: bytes, line: int, kind: str) -> str:
     reason = reason.partition(":")[0]
     if not text.strip():
         return f"the file is empty; pass {kind} file"
-    found = _not_utf8(text)
-    if found and "invalid token" in reason:
-        return f"{found}, and the file declares no other encoding; save it as UTF-8, or name the encoding in <?xml encoding=...?>"
+    result = _not_utf8(text)
+    if result and "invalid token" in reason:
+        return f"{result}, and the file declares no other encoding; save it as UTF-8, or name the encoding in <?xml " \
+               "encoding=...?>"
     if reason == "unbound prefix":
         lines = text.decode("utf-8", "replace").splitlines()
         tag = lines[line - 1].strip() if line <= len(lines) else ""

@@ -73,15 +73,15 @@ class _Mover(NamedTuple):
 
 def _movers(order: list[UrdfJoint], moving: dict[str, str]) -> dict[str, _Mover]:
     """The mover of each link that moves."""
-    found: dict[str, _Mover] = {}
+    result: dict[str, _Mover] = {}
     for joint in order:
-        before = found.get(joint.parent)
+        before = result.get(joint.parent)
         if joint.name in moving:
-            found[joint.child] = _Mover(joint, np.eye(3), np.zeros(3))
+            result[joint.child] = _Mover(joint, np.eye(3), np.zeros(3))
         elif before is not None:
             turn, shift = place(joint.origin)
-            found[joint.child] = _Mover(before.joint, before.R @ turn, before.p + before.R @ shift)
-    return found
+            result[joint.child] = _Mover(before.joint, before.R @ turn, before.p + before.R @ shift)
+    return result
 
 
 def _along(mover: _Mover, inertial: Inertial) -> float:
@@ -96,9 +96,9 @@ def _along(mover: _Mover, inertial: Inertial) -> float:
     center = mover.p + mover.R @ shift
     arm = np.cross(axis, center)
     across = (mover.R @ turn).T @ axis
-    found = inertial.mass * (arm @ arm) + across @ tensor(inertial) @ across
+    result = inertial.mass * (arm @ arm) + across @ tensor(inertial) @ across
     least = _NONE * (np.abs(inertial.inertia).max() + inertial.mass * (center @ center))
-    return float(found) if found > least else 0.0
+    return float(result) if result > least else 0.0
 
 
 def negligible(robot: Robot) -> float:

@@ -34,8 +34,8 @@ class MeshFiles:
             candidates = [self.folder / inside, self.folder / rest, above / rest, above.parent / inside]
         else:
             candidates = [self.base / inside]
-        found = [c.resolve() for c in candidates]
-        held = [c for c in found if c.is_relative_to(self.folder)]
+        result = [c.resolve() for c in candidates]
+        held = [c for c in result if c.is_relative_to(self.folder)]
         if not held:
             self.faults.at(line, f"{what}: the mesh {shown(name)} is outside of the folder {self.folder}; pass folder=... with "
                                  "one that holds all files of the robot")

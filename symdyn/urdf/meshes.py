@@ -54,8 +54,8 @@ def loaded(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             stated = _UNIT.search(content)
             vertices *= float(stated[1]) if stated else 1.0
         else:
-            found: Any = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
-            vertices, faces = np.array(found.vertices, dtype=float), np.array(found.faces, dtype=int)
+            result: Any = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
+            vertices, faces = np.array(result.vertices, dtype=float), np.array(result.faces, dtype=int)
             colors = np.full(faces.shape, np.nan)
     except Exception as error:  # of any kind: parsers of others
         raise ValueError(f"cannot be read as {kind} ({type(error).__name__}: {str(error)[:80]})") from None

@@ -31,12 +31,12 @@ class Names:
         return self._free(_ODD.sub("_", name), " ", ("",))
 
     def _free(self, name: str, gap: str, ends: tuple[str, ...]) -> str:
-        found, k = name, 1
-        while any(found + end in self.taken for end in ends):
+        result, k = name, 1
+        while any(result + end in self.taken for end in ends):
             k += 1
-            found = f"{name}{gap}{k}"
-        self.taken.update(found + end for end in ends)
-        return found
+            result = f"{name}{gap}{k}"
+        self.taken.update(result + end for end in ends)
+        return result
 
 
 class Parameters:

@@ -23,7 +23,7 @@ def parse(root: Element, faults: FileFaults) -> Robot:
     if root.tag != "robot":
         faults.at(root.line, f"the file holds a <{root.tag}>; a URDF holds a <robot>")
         return Robot("")
-    _refuse_xacro(root, faults)
+    _reject_xacro(root, faults)
     robot = Robot(root.attributes.get("name", "").strip())
     for element in root.children:
         if element.tag == "link":
@@ -35,31 +35,31 @@ def parse(root: Element, faults: FileFaults) -> Robot:
     return robot
 
 
-def _refuse_xacro(root: Element, faults: FileFaults) -> None:
+def _reject_xacro(root: Element, faults: FileFaults) -> None:
     for element in root.everything():
         space, _, name = element.tag.rpartition("}")
         if "xacro" in space:
             faults.at(element.line, f"<xacro:{name}> is left over from xacro; run the file through xacro first")
 
 
-def _add(known: dict[str, Named], found: Named, what: str, faults: FileFaults) -> bool:
+def _add(known: dict[str, Named], result: Named, what: str, faults: FileFaults) -> bool:
     """Whether it has a name of its own."""
-    if not found.name:
+    if not result.name:
         return False
-    if found.name in known:
-        faults.at(found.line, f"the {what} {shown(found.name)} is there already, in line {known[found.name].line}; give each a "
-                              "name "
+    if result.name in known:
+        faults.at(result.line, f"the {what} {shown(result.name)} is there already, in line {known[result.name].line}; give each "
+                              "a name "
                               "of its own")
         return False
-    known[found.name] = found
+    known[result.name] = result
     return True
 
 
 def _demand_once(element: Element, what: str, faults: FileFaults) -> None:
     for tag in ONCE[element.tag]:
-        found = list(element.all(tag))
-        if len(found) > 1:
-            faults.at(found[1].line, f"{what} has another <{tag}> in line {found[0].line}; leave one of them out")
+        result = list(element.all(tag))
+        if len(result) > 1:
+            faults.at(result[1].line, f"{what} has another <{tag}> in line {result[0].line}; leave one of them out")
 
 
 def _origin(element: Element, what: str, faults: FileFaults) -> Origin:
@@ -96,10 +96,10 @@ def _joint(element: Element, faults: FileFaults) -> UrdfJoint:
         faults.at(element.line, f"{what} has the type {shown(kind)}; there are {', '.join(TYPES)}")
     ends = []
     for end in ("parent", "child"):
-        found = element.find(end)
-        if found is None:
+        result = element.find(end)
+        if result is None:
             faults.at(element.line, f"{what} has no {end}; write <{end} link=\"...\"/>")
-        ends.append("" if found is None else faults.name(found, "link", f"{what}: {end}"))
+        ends.append("" if result is None else faults.name(result, "link", f"{what}: {end}"))
     dynamics = element.find("dynamics")
     damping = 0.0 if dynamics is None else faults.number(dynamics, "damping", what, 0.0)
     return UrdfJoint(name, kind, ends[0], ends[1], _origin(element, what, faults), _axis(element, kind, what, faults), damping,
@@ -108,24 +108,24 @@ def _joint(element: Element, faults: FileFaults) -> UrdfJoint:
 
 def _axis(element: Element, kind: str, what: str, faults: FileFaults) -> Triple:
     """The axis with length 1, whatever its length in the file."""
-    found = element.find("axis")
+    result = element.find("axis")
     if kind in ("fixed", "floating"):
         return AXIS
-    axis = faults.triple(found, "xyz", what, AXIS)
+    axis = faults.triple(result, "xyz", what, AXIS)
     length = math.hypot(*axis)
     if length < 1e-12:
-        faults.at(element.line if found is None else found.line, f"{what}: its axis is zero; give a direction")
+        faults.at(element.line if result is None else result.line, f"{what}: its axis is zero; give a direction")
         return AXIS
     # What is a unit vector to rounding stays as it is written.
     return axis if abs(length - 1) < 1e-15 else (axis[0] / length, axis[1] / length, axis[2] / length)
 
 
 def _mimic(element: Element, kind: str, what: str, faults: FileFaults) -> Mimic | None:
-    found = element.find("mimic")
-    if found is None or kind == "fixed":
+    result = element.find("mimic")
+    if result is None or kind == "fixed":
         return None
     if TYPES.get(kind, 1) != 1:
-        faults.at(found.line, f"{what} is {kind} and has a <mimic>, which takes one coordinate; leave it out")
+        faults.at(result.line, f"{what} is {kind} and has a <mimic>, which takes one coordinate; leave it out")
         return None
-    return Mimic(faults.name(found, "joint", f"{what}: mimic"), faults.number(found, "multiplier", what, 1.0),
-                 faults.number(found, "offset", what, 0.0), found.line)
+    return Mimic(faults.name(result, "joint", f"{what}: mimic"), faults.number(result, "multiplier", what, 1.0),
+                 faults.number(result, "offset", what, 0.0), result.line)

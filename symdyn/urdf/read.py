@@ -113,8 +113,8 @@ def patterns(given: Any, what: str) -> list[str]:
 
 def system_name(name: str) -> str:
     """An identifier like the robot's name."""
-    found = re.sub(r"\W+", "_", name).strip("_") or "robot"
-    return f"robot_{found}" if not found.isidentifier() or keyword.iskeyword(found) else found
+    result = re.sub(r"\W+", "_", name).strip("_") or "robot"
+    return f"robot_{result}" if not result.isidentifier() or keyword.iskeyword(result) else result
 
 
 class _Builder:
@@ -196,8 +196,8 @@ class _Builder:
             # Its x and y are along those of the joint's frame, turned by the smallest angle that makes z the normal.
             normal = _onto(joint.axis)
             placed["parent_rotation"] = _matrix((np.array(rows) @ np.array(normal)).tolist())
-            found = [self._coordinate(letters, joint.name) for letters in ("x", "y", "theta")]
-            return Planar(name, parent, child, found, child_rotation=_matrix(normal), **placed)
+            result = [self._coordinate(letters, joint.name) for letters in ("x", "y", "theta")]
+            return Planar(name, parent, child, result, child_rotation=_matrix(normal), **placed)
         kind = Prismatic if joint.kind == "prismatic" else Revolute
         return kind(name, parent, child, self._value(joint, following), axis=list(map(plain, joint.axis)), **placed)
 
@@ -212,8 +212,8 @@ class _Builder:
         return plain(multiplier) * q + plain(offset)
 
     def _free(self, name: str, parent: Body, child: Body, **placed: Any) -> Free:
-        found = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
-        return Free(name, parent, child, found, orientation=EulerParameters(), velocity="body", **placed)
+        result = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
+        return Free(name, parent, child, result, orientation=EulerParameters(), velocity="body", **placed)
 
     def _held(self, joint: UrdfJoint, name: str, child: Body, point: list[Any], value: float) -> Fixed:
         """The joint at rest where its coordinate has a value."""

@@ -61,9 +61,9 @@ class Visuals:
 
     def _mesh(self, shape: Element, what: str) -> list[Piece]:
         name = self.faults.name(shape, "filename", what)
-        found = self.files.pieces(name, shape.line, what) if name else []
-        scale = np.array(self.faults.triple(shape, "scale", what, (1.0, 1.0, 1.0))) if found else 1.0
-        return [Piece(p.vertices * scale, p.faces, p.color) for p in found]
+        result = self.files.pieces(name, shape.line, what) if name else []
+        scale = np.array(self.faults.triple(shape, "scale", what, (1.0, 1.0, 1.0))) if result else 1.0
+        return [Piece(p.vertices * scale, p.faces, p.color) for p in result]
 
     def _color(self, visual: Element, materials: Mapping[Any, Element], what: str) -> list[float] | None:
         material = visual.find("material")

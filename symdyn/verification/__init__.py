@@ -176,10 +176,10 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
 def _proved(equations: Equations) -> set[Callable[[Sample], float | None]]:
     """Checks that exact algebra proves. That of the kinetic energy needs a mass matrix without speeds besides its claim."""
     claims = proved_quickly(equations, {name for names in PROVED_BY.values() for name in names})
-    found = {check for check, names in PROVED_BY.items() if claims.issuperset(names)}
-    if holds.kinetic_energy_quadratic in found and depends_on(equations.quantity("M_tilde").ravel(), SPEED):
-        found.remove(holds.kinetic_energy_quadratic)
-    return found
+    result = {check for check, names in PROVED_BY.items() if claims.issuperset(names)}
+    if holds.kinetic_energy_quadratic in result and depends_on(equations.quantity("M_tilde").ravel(), SPEED):
+        result.remove(holds.kinetic_energy_quadratic)
+    return result
 
 
 def depends_on(entries: Iterable[Any], kind: int) -> bool:
@@ -206,8 +206,8 @@ def judged(samples: Sequence[Sample], name: str, check: Callable[[Sample], float
 
 def _known(samples: Sequence[Sample], check: Callable[[Sample], float | None]) -> list[float]:
     """Residuals at the samples where the check applies."""
-    found = []
+    result = []
     for s in samples:
         with mpmath.workdps(s.digits + 5):
-            found.append(check(s))
-    return [r for r in found if r is not None]
+            result.append(check(s))
+    return [r for r in result if r is not None]

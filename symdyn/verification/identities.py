@@ -58,9 +58,9 @@ def inverse_of_forward(s: Sample) -> float | None:
         return residual
     given = np.array([mpmath.sin(3 * k + 1) for k in range(s.n_u)], dtype=object)
     names = [f"{u.name}_dot" for u in s.equations.symbols.speeds]
-    found = s.at(dict(zip(names, given, strict=True)))["inverse_dynamics"]
+    result = s.at(dict(zip(names, given, strict=True)))["inverse_dynamics"]
     inertial = s["M_tilde"] @ given
-    other = relative(found - (inertial + s["k_tilde"] - s["F_tilde"]), np.concatenate([inertial, s["k_tilde"], s["F_tilde"]]))
+    other = relative(result - (inertial + s["k_tilde"] - s["F_tilde"]), np.concatenate([inertial, s["k_tilde"], s["F_tilde"]]))
     return max(residual, other)
 
 
@@ -86,9 +86,9 @@ def energy_balance(s: Sample) -> float | None:
     seeds.update(given_by_time(eq.leaves))
     rates = forward(eq.recorder, eq.quantity("energy").ravel().tolist(), seeds)
     tape = Tape.of(eq.recorder, rates=rates, power=eq.quantity("power"))
-    found = s.evaluate(tape)
-    power = found["power"].ravel()[0]
-    return relative(np.array([sum(found["rates"]) - power]), np.array([*found["rates"], power, *s["energy"]]))
+    result = s.evaluate(tape)
+    power = result["power"].ravel()[0]
+    return relative(np.array([sum(result["rates"]) - power]), np.array([*result["rates"], power, *s["energy"]]))
 
 
 def kinetic_energy_quadratic(s: Sample) -> float | None:
@@ -109,20 +109,20 @@ def jacobian_of_positions(s: Sample) -> float | None:
     if wanted is None or not (s.has("r") or s.has("positions", "frames")):
         return None
     if s.has("r"):
-        found = difference(s, "r", {}) - difference(s, "r", at_rest)
-        return relative(found - wanted, wanted)
+        result = difference(s, "r", {}) - difference(s, "r", at_rest)
+        return relative(result - wanted, wanted)
     v = difference(s, "positions", {}) - difference(s, "positions", at_rest)
     omega = angular_velocities(s, {}) - angular_velocities(s, at_rest)
     rows = np.concatenate([v, omega], axis=1)
-    found = (rows[:, [0, 1, 5]] if s.equations.planar else rows).ravel()
-    return relative(found - wanted, wanted)
+    result = (rows[:, [0, 1, 5]] if s.equations.planar else rows).ravel()
+    return relative(result - wanted, wanted)
 
 
 def coriolis_times_speeds(s: Sample) -> float | None:
     if not s.has("coriolis", "k_tilde"):
         return None
-    found = s["coriolis"] @ s.u
-    return relative(found - s["k_tilde"], found)
+    result = s["coriolis"] @ s.u
+    return relative(result - s["k_tilde"], result)
 
 
 def coriolis_is_skew_with_mass_rate(s: Sample) -> float | None:
@@ -133,8 +133,8 @@ def coriolis_is_skew_with_mass_rate(s: Sample) -> float | None:
     M = eq.quantity("M_tilde")
     seeds = dict(zip([eq.leaves[q] for q in eq.symbols.coordinates], eq.quantity("rates"), strict=True))
     rate = np.array(forward(eq.recorder, M.ravel().tolist(), seeds), dtype=object).reshape(M.shape)
-    found = s.evaluate(Tape.of(eq.recorder, rate=rate, C=eq.quantity("coriolis")))
-    return relative(found["rate"] - found["C"] - found["C"].T, found["C"])
+    result = s.evaluate(Tape.of(eq.recorder, rate=rate, C=eq.quantity("coriolis")))
+    return relative(result["rate"] - result["C"] - result["C"].T, result["C"])
 
 
 def angular_velocities(s: Sample, changes: Mapping[str, Any]) -> np.ndarray:
@@ -155,11 +155,11 @@ def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
         matrix = _whole(s)[0].astype(float) if eq.constraints else s["M_tilde"].astype(float)
         condition = max(1.0, np.linalg.cond(equilibrated(matrix))) if len(matrix) else 1.0
         try:
-            found = module.evaluate("rhs", float(s.values["t"]), x, p, inputs)
+            result = module.evaluate("rhs", float(s.values["t"]), x, p, inputs)
             lam = module.evaluate("lam", float(s.values["t"]), x, p, inputs) if eq.constraints else np.zeros(0)
         except EvaluationError:
             return float("inf") if s.numbers else None  # arbitrary parameters need not make a definite mass matrix
-        residual = relative(found - s["rhs"], s["rhs"])
+        residual = relative(result - s["rhs"], s["rhs"])
         if len(lam):
             terms = s["C_r"].T * lam  # where rows depend on each other only the sums are unique
             size = np.concatenate([terms.ravel(), s["F_tilde"], s["k_tilde"]])
@@ -191,8 +191,8 @@ def left_free(s: Sample) -> np.ndarray:
     order = [int(k) for k in qr(C_r.astype(float), pivoting=True, mode="r")[1]] if n_c else list(range(n_u))
     dependent, free = order[:n_c], order[n_c:]
     Z = np.zeros((n_u, len(free)), dtype=object)
-    for place, k in enumerate(free):
-        Z[k, place] = mpmath.mpf(1)
+    for index, k in enumerate(free):
+        Z[k, index] = mpmath.mpf(1)
     if n_c and free:
         Z[dependent] = -solved(C_r[:, dependent], C_r[:, free])
     return Z
@@ -237,11 +237,11 @@ def whole_system(s: Sample) -> float | None:
     """Accelerations and constraint forces against those of the whole system [[M, C_r^T], [C_r, 0]], solved with pivoting, of
     the statements and of the numeric algorithm."""
     matrix, right = _whole(s)
-    found = solved(matrix, right[:, None])[:, 0]
-    ud = found[:s.n_u]
-    forced = -(s["C_r"][s.independent].T @ found[s.n_u:]) if s.independent else np.zeros(s.n_u, dtype=object)
+    result = solved(matrix, right[:, None])[:, 0]
+    ud = result[:s.n_u]
+    forced = -(s["C_r"][s.independent].T @ result[s.n_u:]) if s.independent else np.zeros(s.n_u, dtype=object)
     residuals = []
-    ways = [s] if s.equations.otherwise is None else [s, s.of(s.equations.otherwise)]
+    ways = [s] if s.equations.singular_fallback is None else [s, s.of(s.equations.singular_fallback)]
     for way in ways:
         residuals += [relative(way["accelerations"] - ud, ud),
                       relative(-(way["C_r"].T @ way["lam"]) - forced, np.concatenate([forced, s["F_tilde"], s["k_tilde"]]))]

@@ -142,7 +142,7 @@ def _bodies(equations: Equations, s: Sample) -> dict[str, np.ndarray]:
         R, origin = kinematics.frame(pose.link)
         arm = origin - kinematics.position(pose, algebra.constants(body.com))
         loads.append([*(R @ f), *(R @ n + cross(arm, R @ f))])
-    found = owner.all_reactions()
+    result = owner.all_reactions()
     joints = _all_joints(owner)
     points = [kinematics.position(owner.tree.ground if child == -1 else owner.tree.poses[child],
                                   algebra.constants(joint.child_point)) for joint, _, child in joints]
@@ -150,7 +150,7 @@ def _bodies(equations: Equations, s: Sample) -> dict[str, np.ndarray]:
                    inertia=np.array([algebra.matrix(b.inertia).ravel() for b in model.bodies], dtype=object),
                    loads=np.array(loads, dtype=object), gravity=algebra.constants(model.gravity),
                    points=np.array(points, dtype=object).reshape(-1, 3),
-                   wrenches=np.array([found[joint.name] for joint, _, _ in joints], dtype=object).reshape(-1, 6))
+                   wrenches=np.array([result[joint.name] for joint, _, _ in joints], dtype=object).reshape(-1, 6))
     return s.evaluate(tape)
 
 

@@ -17,7 +17,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.shown import name_of
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.evaluate import evaluate
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 from symdyn.tape.tape import Tape
 from symdyn.verification.sample import Sample
 
@@ -36,10 +36,10 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
     numbers = all(p.name in given for p in symbols.parameters)
     parameters = {p.name: given.get(p.name, stream.uniform(0.5, 1.5)) for p in symbols.parameters}
     manifold = _Manifold.of(equations, parameters) if equations.constraints else None
-    found: list[Sample] = []
+    result: list[Sample] = []
     for attempt in range(40 * states):
-        if len(found) == states:
-            return found
+        if len(result) == states:
+            return result
         values = {"t": stream.uniform(0, 1), **parameters}
         for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
             # Elastic coordinates stay as small together as one of them may be: beyond, a kinetic energy to second order is none.
@@ -56,12 +56,12 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
             independent = reached
         sample = Sample(equations, values, digits, numbers, independent)
         if _defined(sample):
-            found.append(sample)
+            result.append(sample)
     if manifold is not None:
-        raise SymdynError(f"{equations.name}: {len(found)} of {40 * states} searches near the initial state ended at a "
+        raise SymdynError(f"{equations.name}: {len(result)} of {40 * states} searches near the initial state ended at a "
                           "consistent state where the right-hand side is defined; give an initial state near one, and numbers "
                           "to all parameters (defaults, or params) that the mechanism can be assembled with")
-    raise SymdynError(f"{equations.name}: the right-hand side is defined at {len(found)} of {40 * states} random states only "
+    raise SymdynError(f"{equations.name}: the right-hand side is defined at {len(result)} of {40 * states} random states only "
                       "(coordinates and speeds in [-1, 1]); check where its loads leave their domain, such as log, sqrt or a "
                       "division, and whether these parameters leave a joint without mass and inertia")
 
@@ -112,24 +112,24 @@ class _Manifold:
         holonomic = np.flatnonzero(self.equations.holonomic)
         if not len(holonomic):
             return []
-        found = evaluate(self.newton, values, digits)
-        rows = [int(holonomic[k]) for k in _independent(found["C_r"][holonomic])]
+        result = evaluate(self.newton, values, digits)
+        rows = [int(holonomic[k]) for k in _independent(result["C_r"][holonomic])]
         for _ in range(STEPS):
-            dq = found["N"] @ _least(found["C_r"][rows], -found["C"][rows])
+            dq = result["N"] @ _least(result["C_r"][rows], -result["C"][rows])
             values.update({name: mpmath.mpf(values[name]) + d for name, d in zip(names, dq, strict=True)})
             _on_unit_sphere(self.equations, values)
-            found = evaluate(self.newton, values, digits)
-        left = max(abs(c * s) for c, s in zip(found["C"], found["C_scale"], strict=True))
-        return rows if left < found["length"].item() * mpmath.mpf(10) ** (8 - digits) else None
+            result = evaluate(self.newton, values, digits)
+        left = max(abs(c * s) for c, s in zip(result["C"], result["C_scale"], strict=True))
+        return rows if left < result["length"].item() * mpmath.mpf(10) ** (8 - digits) else None
 
     def _velocities(self, values: dict[str, Any], digits: int) -> tuple[int, ...]:
         names = [u.name for u in self.equations.symbols.speeds]
-        found = evaluate(self.speeds, values, digits)
-        rows = _independent(found["C_r"])
+        result = evaluate(self.speeds, values, digits)
+        rows = _independent(result["C_r"])
         for _ in range(2):  # twice for the last digits
-            du = _least(found["C_r"][rows], -found["C_dot"][rows])
+            du = _least(result["C_r"][rows], -result["C_dot"][rows])
             values.update({name: mpmath.mpf(values[name]) + d for name, d in zip(names, du, strict=True)})
-            found = evaluate(self.speeds, values, digits)
+            result = evaluate(self.speeds, values, digits)
         return tuple(rows)
 
 

@@ -20,10 +20,10 @@ Row = tuple[str, Callable[[Sample], float | None], float]
 
 def user_functions(equations: Equations) -> list[UserFunction]:
     """Those that the motion depends on, by name, with their derivatives."""
-    found = [node.args[0] for node in _calls(equations)]
-    for f in found:
-        found += [f.derivative] if f.derivative is not None else []
-    return sorted(dict.fromkeys(found), key=lambda f: f.label)
+    result = [node.args[0] for node in _calls(equations)]
+    for f in result:
+        result += [f.derivative] if f.derivative is not None else []
+    return sorted(dict.fromkeys(result), key=lambda f: f.label)
 
 
 def checks_of_user_functions(equations: Equations, backends: Mapping[str, str]) -> list[Row]:
@@ -79,10 +79,10 @@ def _jacobian_agrees(backend: str) -> Callable[[Sample], float | None]:
         x, p, inputs = ([float(s.values[n.name]) for group in groups for n in group] for groups in (
             (symbols.coordinates, symbols.speeds, symbols.states), (symbols.parameters,), (symbols.inputs,)))
         try:
-            found = s.equations.compile(backend=backend).evaluate("jacobian_x", float(s.values["t"]), x, p, inputs)
+            result = s.equations.compile(backend=backend).evaluate("jacobian_x", float(s.values["t"]), x, p, inputs)
         except EvaluationError:
             return float("inf") if s.numbers else None
-        return relative(found - s["jacobian_x"], s["jacobian_x"])
+        return relative(result - s["jacobian_x"], s["jacobian_x"])
     return check
 
 
@@ -91,11 +91,11 @@ def _residual(f: UserFunction, at: list[Any], step: Any) -> float:
     assert f.derivative is not None
     given = np.array(f.derivative.precise(mpmath.mp, at), dtype=object).reshape(f.results, len(at))
     residual = 0.0
-    found = np.empty_like(given)
+    result = np.empty_like(given)
     for j, value in enumerate(at):
         h = step * max(1, abs(value))
         ends = [f.precise(mpmath.mp, [*at[:j], value + sign * h, *at[j + 1:]]) for sign in (1, -1)]
-        found[:, j] = [(a - b) / (2 * h) for a, b in zip(*ends, strict=True)]
+        result[:, j] = [(a - b) / (2 * h) for a, b in zip(*ends, strict=True)]
     for k, here in enumerate(f.precise(mpmath.mp, at)):
-        residual = max(residual, relative(found[k] - given[k], np.array([*given[k], *found[k], here])))
+        residual = max(residual, relative(result[k] - given[k], np.array([*given[k], *result[k], here])))
     return residual

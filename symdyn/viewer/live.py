@@ -17,7 +17,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.trees.recursive import recursive
 from symdyn.pictures.arrows import POINTS
 from symdyn.pictures.bending import bent_bodies
-from symdyn.pictures.looks import Mechanism, drawn_otherwise, ropes_of, with_surroundings
+from symdyn.pictures.looks import Mechanism, not_drawn_by_rules, ropes_of, with_surroundings
 from symdyn.pictures.mechanism import filled, touched
 from symdyn.pictures.symbols import typeset_unit
 from symdyn.tape.floats import evaluate_rows
@@ -100,32 +100,32 @@ def _groups(equations: Equations) -> list[list[int]]:
 def _evaluate(equations: Equations, names: Sequence[str], values: dict[str, float]) -> dict[str, np.ndarray]:
     """Quantities at one configuration. Raises ArgumentError where a point is not finite."""
     more = [n for n in ("drawn_lengths", "inertial_parameters", "contact_gaps") if n in equations.quantities]
-    found = {n: rows[0] for n, rows in evaluate_rows(equations.tape(*names, *more), values, 1).items()}
-    wrong = [n for n in (*names, "drawn_lengths") if n in found and not np.isfinite(found[n]).all()]
+    result = {n: rows[0] for n, rows in evaluate_rows(equations.tape(*names, *more), values, 1).items()}
+    wrong = [n for n in (*names, "drawn_lengths") if n in result and not np.isfinite(result[n]).all()]
     if wrong:
         raise ArgumentError(f"{equations.name}: {', '.join(wrong)} are not finite at the coordinates and parameters to be shown; "
                             "pass others with q={...} and params={...}")
-    return found
+    return result
 
 
 def _mechanism(equations: Equations, numbers: dict[str, np.ndarray], values: dict[str, float], coarse: bool) -> Mechanism:
     n_b = len(equations.bodies)
     nothing = np.zeros((0, 6))
-    drawn = drawn_otherwise(equations, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
+    drawn = not_drawn_by_rules(equations, [j[0] for j in equations.joints], [(j[1], j[2]) for j in equations.joints])
     inertia = numbers.get("inertial_parameters")
     springs = numbers.get("spring_points", nothing).reshape(-1, 6)
     gaps = numbers.get("contact_gaps", nothing).ravel()[:4 * len(equations.contacts):4].tolist()
     ropes = ropes_of([c.name for c in equations.contacts], equations.connections, gaps, springs) if len(gaps) else {}
-    found = Mechanism(equations.bodies, numbers["frames"].reshape(n_b, 12), numbers["positions"].reshape(n_b, 3),
+    result = Mechanism(equations.bodies, numbers["frames"].reshape(n_b, 12), numbers["positions"].reshape(n_b, 3),
                      equations.joints, numbers.get("joint_points", nothing).reshape(-1, 6),
                      numbers.get("joint_axes", nothing).reshape(-1, 3), equations.connections,
                      springs, None if inertia is None else inertia.reshape(n_b, 10), equations.planar, equations.down,
                      drawn, ropes=ropes)
-    corners, wheels = _touching(equations, found, values)
+    corners, wheels = _touching(equations, result, values)
     lengths = numbers.get("drawn_lengths", nothing).ravel()
     around = list(filled([*equations.drawn, *equations.surroundings], lengths))[len(equations.drawn):]
-    found = replace(found, corners=corners, wheels=wheels)
-    return with_surroundings(found, around, equations.drawn, found.frames[None], _FURTHER, coarse)
+    result = replace(result, corners=corners, wheels=wheels)
+    return with_surroundings(result, around, equations.drawn, result.frames[None], _FURTHER, coarse)
 
 
 def _touching(equations: Equations, m: Mechanism, values: dict[str, float],
@@ -143,9 +143,9 @@ def _touching(equations: Equations, m: Mechanism, values: dict[str, float],
         for k in group:
             rows[names[k]] = rows[names[k]] / norm
     with np.errstate(all="ignore"):
-        found = evaluate_rows(equations.tape("frames", POINTS), rows, _SAMPLES)
-    at = found[POINTS].reshape(_SAMPLES, -1, 2, 3)[:, :, 0]
-    frames = found["frames"].reshape(_SAMPLES, len(m.bodies), 12)
+        result = evaluate_rows(equations.tape("frames", POINTS), rows, _SAMPLES)
+    at = result[POINTS].reshape(_SAMPLES, -1, 2, 3)[:, :, 0]
+    frames = result["frames"].reshape(_SAMPLES, len(m.bodies), 12)
     there = np.isfinite(frames).all(axis=(1, 2)) & np.isfinite(at).all(axis=(1, 2))
     return touched(m, frames[there], at[there]) if there.sum() > 1 else ([], {})
 
@@ -168,21 +168,21 @@ def _sliders(equations: Equations, values: dict[str, float], names: Sequence[str
     shaped = "drawn_lengths" in equations.quantities
     fixed = {leaf.args[1] for leaf in equations.tape("drawn_lengths").inputs} if shaped else set()
     unit = {c: k for k, group in enumerate(_groups(equations)) for c in group}
-    found = []
+    result = []
     for k, c in enumerate(s.coordinates):
         value = 0.0 if k in unit else values[c.name]
         reach = 1.0 if k in unit else s.reach.get(c) or (math.pi if s.units.get(c) == "rad" else 0.6 * length)
-        found.append(_slider("q", k, c.name, s.units.get(c, ""), values[c.name], value - reach, value + reach))
+        result.append(_slider("q", k, c.name, s.units.get(c, ""), values[c.name], value - reach, value + reach))
     for group, symbols in (("p", s.parameters), ("inputs", s.inputs)):
         for k, p in enumerate(symbols):
             value = values[p.name]
             ends = ((0.1 * value, 2.5 * value) if group == "p" and value else
                     (value - math.pi, value + math.pi) if s.units.get(p) == "rad" else (value - length, value + length))
-            found.append(_slider(group, k, p.name, s.units.get(p, ""), value, min(ends), max(ends),
-                                 p.name in used and p.name not in fixed))
+            result.append(_slider(group, k, p.name, s.units.get(p, ""), value, min(ends), max(ends),
+                                  p.name in used and p.name not in fixed))
     waves = any("waves" in record["values"] for record in equations.drawn)
-    found.append(_slider("t", 0, "t", "s", 0.0, 0.0, s.duration, waves or "t" in used))
-    return found
+    result.append(_slider("t", 0, "t", "s", 0.0, 0.0, s.duration, waves or "t" in used))
+    return result
 
 
 def _slider(group: str, k: int, name: str, unit: str, value: float, least: float, most: float,

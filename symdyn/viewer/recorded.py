@@ -90,7 +90,7 @@ def _arrows(arrows: Arrows, rows: np.ndarray) -> dict[str, Any]:
 
 def _locals(hung: Hung) -> list[list[float]]:
     """Every point as its body and its place there."""
-    return [[int(owner), *map(_short, place)] for owner, place in zip(hung.owners, hung.places, strict=True)]
+    return [[int(owner), *map(_short, index)] for owner, index in zip(hung.owners, hung.places, strict=True)]
 
 
 def _axes(hung: Hung) -> list[list[float]]:
@@ -136,20 +136,20 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
     rows = np.stack([np.stack(row, axis=-1) for row in ((squares[..., 0], a, b, c), (a, squares[..., 1], d, e),
                                                         (b, d, squares[..., 2], f), (c, e, f, squares[..., 3]))], axis=-2)
     best = squares.argmax(axis=-1)
-    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+    result = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    return np.asarray(result / np.linalg.norm(result, axis=-1, keepdims=True))
 
 
 def _panels(solution: Solution, order: np.ndarray, show: Sequence[str] | None) -> list[dict[str, Any]]:
     """Curves over time, thinned; show: which ones, None for all."""
     stride = max(1, -(-len(order) // _CURVES))
     rows = order[np.unique([*range(0, len(order), stride), len(order) - 1])]
-    panels, found = panels_of(solution, show), []
+    panels, result = panels_of(solution, show), []
     need_something(solution, show, panels or (show is not None and "mechanism" in show))
     for panel in panels:
         values = panel.values[rows]
         if np.isfinite(values).all():
             title = f"{panel.title}: {panel.part}" if panel.part else panel.title
-            found.append({"title": title, "unit": typeset_unit(panel.unit), "names": [n.replace("\n", " ") for n in panel.names],
-                          "t": packed(solution.t[rows]), "values": packed(values)})
-    return found
+            result.append({"title": title, "unit": typeset_unit(panel.unit), "names": [n.replace("\n", " ") for n in panel.names],
+                           "t": packed(solution.t[rows]), "values": packed(values)})
+    return result

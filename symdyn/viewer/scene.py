@@ -63,15 +63,15 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
 
 
 def _plain(item: Item) -> dict[str, Any]:
-    found: dict[str, Any] = {"kind": item.kind, "ends": [_ref(end) for end in item.ends], "color": item.color, "name": item.name,
-                             "size": [_short(v) for v in item.size], "body": item.body}
+    result: dict[str, Any] = {"kind": item.kind, "ends": [_ref(end) for end in item.ends], "color": item.color, "name": item.name,
+                              "size": [_short(v) for v in item.size], "body": item.body}
     if item.axis >= 0:
-        found["axis"] = item.axis
+        result["axis"] = item.axis
     if item.turn:
-        found["turn"] = [_short(v) for v in item.turn]
+        result["turn"] = [_short(v) for v in item.turn]
     if item.layer:
-        found["layer"] = item.layer
-    return found
+        result["layer"] = item.layer
+    return result
 
 
 def _ref(ref: Any) -> Any:
@@ -89,27 +89,27 @@ def _body_of(index: int, m: Mechanism) -> int:
 def _mesh(part: Part, m: Mechanism, color: str, bending: Bending | None, length: float) -> dict[str, Any]:
     triangles = [(face[0], a, b) for face in part.faces for a, b in pairwise(face[1:])]
     body = _body_of(part.body, m)
-    found = {"body": body, "color": color, "name": m.bodies[body] if body >= 0 else "ground", "vertices": plain(part.vertices),
-             "triangles": text_of(np.array(triangles, dtype="<u2"))}
+    result = {"body": body, "color": color, "name": m.bodies[body] if body >= 0 else "ground", "vertices": plain(part.vertices),
+              "triangles": text_of(np.array(triangles, dtype="<u2"))}
     if bending is not None:
         stations, which = np.unique(part.stations, axis=0, return_inverse=True)
         of = bending.at_stations(stations)
         n = len(stations)
-        found["bend"] = {"station": text_of(which.ravel().astype("<u2")), "shapes": plain(of.shapes.reshape(n, -1)),
-                         "second": plain(of.second.reshape(n, -1)), "eta": list(bending.coordinates)}
-    return found
+        result["bend"] = {"station": text_of(which.ravel().astype("<u2")), "shapes": plain(of.shapes.reshape(n, -1)),
+                          "second": plain(of.second.reshape(n, -1)), "eta": list(bending.coordinates)}
+    return result
 
 
 def _threads(part: Part, m: Mechanism, color: str, length: float) -> list[dict[str, Any]]:
     """A line as thin rods from vertex to vertex; the last vertex may be on another body."""
     body, last = _body_of(part.body, m), len(part.vertices) - 1
     name = m.bodies[body] if body >= 0 else "ground"
-    found = []
+    result = []
     for a, b, *_ in part.edges:
         end = body if part.to is None or b != last else _body_of(part.to, m)
-        found.append(Item("thread", ((body, *part.vertices[a]), (end, *part.vertices[b])), (_THREAD * part.width * length,),
-                          color, f"line of {name}", body))
-    return [_plain(item) for item in found]
+        result.append(Item("thread", ((body, *part.vertices[a]), (end, *part.vertices[b])), (_THREAD * part.width * length,),
+                           color, f"line of {name}", body))
+    return [_plain(item) for item in result]
 
 
 def _water(water: Water) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler, flags
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape.evaluate import evaluate
 from tests.helpers import swept
 
@@ -42,11 +42,11 @@ def routes(request: pytest.FixtureRequest, derived: Callable[..., Any]) -> Route
     functions = [f for f in FUNCTIONS if has_function(equations, f)]
     units: dict[str, Any] = {}
     python = emit(equations, "numpy", functions, standalone=False)
-    units["numpy"] = PythonUnit.from_source(next(iter(python.files.values())), equations.name)
+    units["numpy"] = PythonLibrary.from_source(next(iter(python.files.values())), equations.name)
     compiler = find_compiler()
     if compiler is not None:
         c = emit(equations, "c", functions, standalone=False, integrator=False)
-        units["c"] = CUnit(next(iter(c.files.values())), c.metadata, compiler)
+        units["c"] = CLibrary(next(iter(c.files.values())), c.metadata, compiler)
     return Routes(equations, functions, units, factor)
 
 

@@ -17,7 +17,7 @@ from symdyn.pipeline import emit
 from symdyn.runtime.batches.states import tables_of
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler, find_compiler, plain
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 from symdyn.systems import get
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.node import COORDINATE, PARAMETER
@@ -67,7 +67,7 @@ def compilers() -> dict[str, Compiler]:
 
 def both(source: Source, compiler: Compiler, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """rhs of many states at once, and one by one; codes; lanes."""
-    unit = CUnit(next(iter(source.files.values())), source.metadata, compiler)
+    unit = CLibrary(next(iter(source.files.values())), source.metadata, compiler)
     n = len(x)
     out, codes = np.zeros((n, x.shape[1])), np.zeros(n, dtype=np.intc)
     arrays = [np.zeros((1, 1)), x, np.zeros((1, len(source.metadata.inputs))), p]

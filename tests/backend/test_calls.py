@@ -86,7 +86,7 @@ def test_singular_states_are_done_in_the_other_way(name: str, backend: str) -> N
     for function in ("rhs", "lam"):
         rows = []
         for given in (REGULAR[name], SINGULAR[name]):
-            tape = equations(name).otherwise.tape(function)
+            tape = equations(name).singular_fallback.tape(function)
             rows.append(evaluate_rows(tape, values(name, given), 1)[function][0])
         x = np.array([state(name, REGULAR[name]), state(name, SINGULAR[name])])
         size = np.abs(rows).max()
@@ -99,15 +99,15 @@ def test_singular_states_are_done_in_the_other_way(name: str, backend: str) -> N
 def test_both_ways_are_in_the_program(name: str) -> None:
     made = emit(equations(name), "c", ("rhs", "mass_matrix", "lam", "C"), standalone=False)
     functions = {f.name: f for f in made.program.functions}
-    assert functions["C"].otherwise is None and functions["mass_matrix"].otherwise is None
+    assert functions["C"].singular_fallback is None and functions["mass_matrix"].singular_fallback is None
     for function in ("rhs", "lam"):
         two = functions[function]
-        assert two.regular is not None and two.otherwise is not None and not two.results
-        assert set(two.arguments) == {*two.regular.arguments, *two.otherwise.arguments}
-        assert two.count == two.regular.count < two.otherwise.count and "kernel" in two.otherwise.operations
-    assert set(made.program.kernels) == {"symdyn_saddle", "symdyn_multipliers"}
+        assert two.regular is not None and two.singular_fallback is not None and not two.results
+        assert set(two.arguments) == {*two.regular.arguments, *two.singular_fallback.arguments}
+        assert two.count == two.regular.count < two.singular_fallback.count and "intrinsic" in two.singular_fallback.operations
+    assert set(made.program.intrinsics) == {"symdyn_saddle", "symdyn_multipliers"}
     n, m = len(equations(name).symbols.speeds), len(equations(name).constraints)
-    assert set(made.program.kernels.values()) == {(n, m)}
+    assert set(made.program.intrinsics.values()) == {(n, m)}
     assert made.metadata.operations["rhs"] == functions["rhs"].count
 
 
@@ -150,7 +150,7 @@ def test_calls_fold_with_the_parameters(backend: str) -> None:
     eq = equations("wheels")
     numbers = {"r1": 2, "r2": 3, "I": 1}
     made = emit(eq, backend, ("rhs", "lam"), standalone=False, specialize=numbers)
-    assert made.program.kernels == {} and made.program.n_c == 0
+    assert made.program.intrinsics == {} and made.program.n_c == 0
     bound = eq.compile(backend=backend, specialize=numbers)
     np.testing.assert_allclose(bound.rhs(0, [0.1, 0.2, 0.2, 0.4]), [0.2, 0.4, 0, 0], atol=1e-12)
 
@@ -188,7 +188,7 @@ def test_calls_in_parts(name: str, longest: int, divided: Callable[[int], None])
     divided(longest)
     made = emit(equations(name), "c", ("rhs", "lam"), standalone=False)
     for function in made.program.functions:
-        assert function.otherwise is not None and len(function.otherwise.parts) > 1
+        assert function.singular_fallback is not None and len(function.singular_fallback.parts) > 1
     parts = equations(name).compile(backend="c")
     for given in (REGULAR[name], SINGULAR[name]):
         x = state(name, given)

@@ -17,7 +17,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.emission import emit
 from symdyn.functions.tapes import columns_of, function_tape
 from symdyn.runtime.building.compiler import find_compiler, flags, require_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape.evaluate import evaluate
 from tests.backend.c_warnings import RUNTIME, faults_of
 from tests.backend.test_runtime_in_c import Build, build
@@ -49,8 +49,8 @@ def both(equations: Any, names: list[str], **options: Any) -> tuple[Any, Any]:
     """The functions in C, several columns at once, and in NumPy, one after the other."""
     c = emit(equations, "c", names, standalone=False, integrator=False, **options)
     python = emit(equations, "numpy", names, standalone=False, **options)
-    return (CUnit(next(iter(c.files.values())), c.metadata, require_compiler()),
-            PythonUnit.from_source(next(iter(python.files.values())), equations.name))
+    return (CLibrary(next(iter(c.files.values())), c.metadata, require_compiler()),
+            PythonLibrary.from_source(next(iter(python.files.values())), equations.name))
 
 
 def states_of(equations: Any, n: int, extra: int = 0) -> tuple[np.ndarray, ...]:
@@ -140,8 +140,8 @@ def test_without_vectors_in_the_compiler(tmp_path: Path) -> None:
     equations = systems.get("three_link_arm").embedding()
     made = emit(equations, "c", ["jacobian_x"], standalone=False, integrator=False)
     text = next(iter(made.files.values()))
-    plain = CUnit(f"#define __TINYC__ 1\n{text}", made.metadata, require_compiler())
-    usual = CUnit(text, made.metadata, require_compiler())
+    plain = CLibrary(f"#define __TINYC__ 1\n{text}", made.metadata, require_compiler())
+    usual = CLibrary(text, made.metadata, require_compiler())
     p, t, x, inputs = states_of(equations, 3)
     results = []
     for unit in (plain, usual):

@@ -16,7 +16,7 @@ import symdyn as sd
 from symdyn.errors import EvaluationError, EvaluationWarning
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import PythonUnit
+from symdyn.runtime.building.library import PythonLibrary
 from tests.user_functions import BOUNDED
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -39,7 +39,7 @@ def equations(name: str) -> Any:
 def loaded(equations: Any, functions: Sequence[str]) -> Any:
     """The generated module."""
     made = emit(equations, "numpy", functions, standalone=False)
-    return PythonUnit.from_source(next(iter(made.files.values())), equations.name).module
+    return PythonLibrary.from_source(next(iter(made.files.values())), equations.name).module
 
 
 @functools.cache
@@ -50,9 +50,9 @@ def written(name: str) -> Any:
 def marked(equations: Any, **sizes: int) -> Any:
     """The same equations, with functions of these sizes that give MARK where they are done in the other way."""
     constant = {name: functools.partial(np.full, size, MARK, dtype=object) for name, size in sizes.items()}
-    others = equations.otherwise
+    others = equations.singular_fallback
     others = dataclasses.replace(others, quantities={**others.quantities, **constant}, _recorded={}, _printed={})
-    return dataclasses.replace(equations, otherwise=others)
+    return dataclasses.replace(equations, singular_fallback=others)
 
 
 def mixed(name: str) -> np.ndarray:

@@ -19,7 +19,7 @@ import pytest
 from symdyn.backend.source import Content, Source, render, template_folders
 from symdyn.errors import EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.library import CLibrary, Library, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.node import COORDINATE
 
@@ -49,19 +49,19 @@ def both(r: Recorder, *angles: Any) -> list[Any]:
     return sines(r, *angles) + cosines(r, *angles)
 
 
-def loaded(values: Callable[..., list[Any]]) -> CUnit:
+def loaded(values: Callable[..., list[Any]]) -> CLibrary:
     compiler = find_compiler()
     if compiler is None:
         pytest.skip("no C compiler here")
     made = source(values)
-    return CUnit(next(iter(made.files.values())), made.metadata, compiler)
+    return CLibrary(next(iter(made.files.values())), made.metadata, compiler)
 
 
-def evaluate(unit: Unit, x: np.ndarray) -> np.ndarray:
+def evaluate(library: Library, x: np.ndarray) -> np.ndarray:
     """f at the angles x, as many at a time as it takes; sines in the first row, cosines in the second."""
     nothing = np.zeros((1, 0))
     rows = np.resize(x, (-(-len(x) // len(NAMES)), len(NAMES)))
-    found = unit.evaluator("f").many(np.zeros(1), rows, nothing, nothing)
+    found = library.evaluator("f").many(np.zeros(1), rows, nothing, nothing)
     return found.reshape(len(rows), -1, len(NAMES)).swapaxes(0, 1).reshape(-1, rows.size)[:, :len(x)]
 
 
@@ -131,7 +131,7 @@ def test_angle_that_is_not_finite(bad: float, place: int) -> None:
 
 def test_python_gives_the_same_within_an_ulp() -> None:
     x = arguments()
-    python = PythonUnit.from_source(next(iter(source(both, "numpy").files.values())), "turning")
+    python = PythonLibrary.from_source(next(iter(source(both, "numpy").files.values())), "turning")
     with np.errstate(all="ignore"):
         wanted, found = evaluate(python, x), evaluate(loaded(both), x)
     assert (abs(found - wanted) <= np.spacing(abs(wanted))).all()

@@ -140,7 +140,7 @@ def test_a_module_from_own_templates(derived: Callable[..., Any], tmp_path: Path
     text = (SHIPPED / "numpy" / "model.py.jinja").read_text()
     (tmp_path / "numpy" / "model.py.jinja").write_text(text + "\nMINE = True\n")
     module = derived("pendulum").compile(backend="numpy", templates=tmp_path)
-    assert module.unit("rhs").module.MINE and module.rhs(0.0, [0.0, 1.0]).tolist() == [1.0, 0.0]
+    assert module.library("rhs").module.MINE and module.rhs(0.0, [0.0, 1.0]).tolist() == [1.0, 0.0]
 
 
 # -- what is said when something is wrong

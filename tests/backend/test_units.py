@@ -17,7 +17,7 @@ from symdyn.backend.units import LEAST_LINES
 from symdyn.pipeline import emit
 from symdyn.runtime.building import objects
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 from symdyn.translation_units import TranslationUnit, joined, translation_units
 from tests.runtime.test_events import ball
 
@@ -146,5 +146,5 @@ def test_a_unit_that_does_not_compile_is_reported_as_one_file(cache: Path, deriv
     source = emit(derived("double_pendulum"), "c", ("rhs",), standalone=False)
     text = next(iter(source.files.values())).replace("symdyn_propose(run);", "symdyn_propose(walk);")
     with pytest.raises(sd.CompileError, match=r"(?s)Source kept at: .*double_pendulum-\w+\.c.*walk"):
-        CUnit(text, source.metadata, require_compiler())
+        CLibrary(text, source.metadata, require_compiler())
     assert not list(cache.glob("unit-*.o"))

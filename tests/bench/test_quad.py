@@ -131,7 +131,7 @@ def test_what_there_is_no_c_of_and_what_needs_more_digits_is_left_to_mpmath():
     x = [*[angle] * 3, *[-angle] * 2, *[ours.context.mpf(1)] * 3, *[ours.context.mpf(-1)] * 2]
     assert relative(ours("rhs", ours.context.mpf(0), x), theirs("rhs", ours.context.mpf(0), x)) < 1e-12
     with pytest.raises(quad.NotInQuad, match="symdyn_saddle has no text"):
-        quad.program(equations.otherwise.tape("rhs"), ours.context, ours.fixed, ours.leaves)
+        quad.program(equations.singular_fallback.tape("rhs"), ours.context, ours.fixed, ours.leaves)
 
     def run(digits, compiled):
         if compiled:

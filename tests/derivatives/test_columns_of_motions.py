@@ -14,7 +14,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.emission import emit
 from symdyn.functions.tapes import columns_of
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 from tests.backend.c_warnings import faults_of
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -34,7 +34,7 @@ def text_of(made: Any) -> str:
 
 def rates(made: Any, x: np.ndarray, inputs: np.ndarray, p: np.ndarray, before: str = "") -> np.ndarray:
     """x_dot and its derivatives along the columns."""
-    unit = CUnit(before + text_of(made), made.metadata, require_compiler())
+    unit = CLibrary(before + text_of(made), made.metadata, require_compiler())
     evaluator = unit.evaluator("rhs")
     evaluator.set_params(p)
     return np.array(evaluator.many(np.array([0.3]), x[None, :], inputs[None, :], np.zeros((1, 0))))[0]

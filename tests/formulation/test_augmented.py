@@ -42,8 +42,8 @@ def at(equations: Equations, *names: str, **given: Any) -> dict[str, np.ndarray]
     numbers: dict[str, Any] = {"t": 0.0, **{p.name: float(s.defaults[p]) for p in s.parameters}}
     numbers |= {a.name: float(s.initial.get(a, 0.0)) for a in (*s.coordinates, *s.speeds, *s.states, *s.inputs)}
     found = {name: rows[0] for name, rows in evaluate_rows(equations.tape(*names), {**numbers, **given}, 1).items()}
-    if equations.otherwise is not None and not all(np.isfinite(value).all() for value in found.values()):
-        return at(equations.otherwise, *names, **given)
+    if equations.singular_fallback is not None and not all(np.isfinite(value).all() for value in found.values()):
+        return at(equations.singular_fallback, *names, **given)
     return found
 
 

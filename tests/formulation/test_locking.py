@@ -12,7 +12,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import EvaluationError
-from symdyn.formulation.probes.vanishing_pivots import lockable
+from symdyn.formulation.probes.vanishing_pivots import vanishing_pivots
 from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
 from symdyn.formulation.textbook.numbers import NumericTree
 from symdyn.formulation.trees import tree as trees
@@ -72,7 +72,7 @@ def stretched(tip: Any = (0.5, 0.2), mass: float = 0.0) -> sd.System:
 
 def found(system: sd.System, **options: Any) -> list[str]:
     tree = tree_of(system.check(), "body")
-    return [str(tree.model.speeds[p]) for p in sorted(lockable(tree, **options))]
+    return [str(tree.model.speeds[p]) for p in sorted(vanishing_pivots(tree, **options))]
 
 
 # -- what is found
@@ -176,7 +176,7 @@ def test_custom_joints_may_lock() -> None:
 def added(system: sd.System, form: str, monkeypatch: pytest.MonkeyPatch, quantity: str = "rhs") -> int:
     """Operations more than without the check."""
     counts = []
-    for way in (lockable, lambda tree, solid=False: {}):
+    for way in (vanishing_pivots, lambda tree, solid=False: {}):
         monkeypatch.setattr(trees, "lockable", way)
         counts.append(function_tape(getattr(system, form)(), quantity).operations)
     return counts[0] - counts[1]

@@ -40,7 +40,7 @@ def test_without_the_numeric_algorithm(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = net(3, 3).augmented().compile(backend="numpy")
     monkeypatch.setattr(saddle, "MOST_ON_STACK", 8 * 2000)
     equations = net(3, 3).augmented()
-    assert usual.places_of_jacobian() is None and equations.otherwise is None
+    assert usual.jacobian_indices() is None and equations.singular_fallback is None
     assert equations.notes[-1] == ("where a pivot vanishes evaluations raise: the numeric algorithm for 21 speeds and 12 "
                                    "constraints would take 0.0 MB of the stack, of 0.0 MB that it may take")
     module = equations.compile(backend="numpy")

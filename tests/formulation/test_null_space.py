@@ -1,4 +1,4 @@
-"""Saddle-point systems as statements: by the Schur complement, by dependent speeds, and where they hand over to the kernel."""
+"""Saddle-point systems as statements: by the Schur complement, by dependent speeds, and where they hand over to the intrinsic."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import symdyn as sd
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.constraints.consistent_states import ConstraintStates
 from symdyn.formulation.constraints.null_space import NullSpaceSolver, elimination_order
-from symdyn.formulation.constraints.saddle import KernelSolver, RangeSolver, fewest_neighbours, narrow_order
+from symdyn.formulation.constraints.saddle import IntrinsicSolver, RangeSolver, fewest_neighbours, narrow_order
 from symdyn.formulation.probes.dependent_rows import ranks, scaled
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import vector
@@ -100,7 +100,7 @@ def test_elimination_fills_in_little() -> None:
 
 
 def test_generated_code_hands_over_where_the_dependent_speeds_lose_their_rows() -> None:
-    """Four-bar with links 1 and 3 such that the eliminated columns are dependent: the kernel gives the same as 30 digits."""
+    """Four-bar with links 1 and 3 such that the eliminated columns are dependent: the intrinsic gives the same as 30 digits."""
     system = sd.systems.four_bar()
     eq = system.augmented()
     module = eq.compile(backend="numpy")
@@ -137,12 +137,12 @@ def _angle_that_aligns(module: Any, x: np.ndarray) -> float:
 def test_rows_that_are_kept_stay_far_from_losing_rank() -> None:
     """Bricard: of its five rows one is redundant; the four that are kept are regular all along its motion."""
     eq = sd.systems.bricard().augmented()
-    assert eq.otherwise is not None
-    found = ranks(eq.otherwise)
+    assert eq.singular_fallback is not None
+    found = ranks(eq.singular_fallback)
     assert found is not None and found.rank == 4 and len(found.independent) == 4
     module = eq.compile(backend="numpy")
     motion = module.simulate(t=np.linspace(0, 10, 21), rtol=1e-8)
-    samples = scaled(ConstraintStates(eq.otherwise, eq.symbols.defaults), motion.q).dense()
+    samples = scaled(ConstraintStates(eq.singular_fallback, eq.symbols.defaults), motion.q).dense()
     kept = np.linalg.svd(samples[:, list(found.independent)], compute_uv=False)[:, -1]
     assert (kept / np.linalg.svd(samples, compute_uv=False)[:, 3]).min() > 0.3
 
@@ -176,7 +176,7 @@ def test_the_numeric_algorithm_takes_long_chains_in_a_narrow_order() -> None:
     recorder, numbers = Recorder(), {}
     Ms, Cs = (leaves(recorder, name, a, numbers) for name, a in (("M", M), ("C", C)))
     f, d = np.sin(np.arange(n)), np.cos(np.arange(n - 10))
-    solver = KernelSolver(TapeAlgebra(recorder, {}), Ms, Cs, vector(*[1] * len(C)), [1] * n, "loose")
+    solver = IntrinsicSolver(TapeAlgebra(recorder, {}), Ms, Cs, vector(*[1] * len(C)), [1] * n, "loose")
     near = ((M != 0) | (C.T @ C != 0))[np.ix_(solver.order, solver.order)]
     assert sorted(solver.order) == list(range(n))
     assert max(k - np.flatnonzero(row)[0] for k, row in enumerate(near)) <= 3 < max(

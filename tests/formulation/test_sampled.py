@@ -72,7 +72,7 @@ def test_zeros_everywhere(sparse: None) -> None:
 @pytest.mark.parametrize("name", ["bricard", "four_bar", "spatial_slider_crank", "rolling_disc", "double_wishbone"])
 def test_verdicts_of_mechanisms_are_the_same(name: str, request: pytest.FixtureRequest) -> None:
     """Rank, rows that imply the others, rows that hold nothing."""
-    equations: Any = sd.systems.get(name).augmented().otherwise
+    equations: Any = sd.systems.get(name).augmented().singular_fallback
     usual = search(equations)
     request.getfixturevalue("sparse")
     found = search(equations)

@@ -312,7 +312,7 @@ def test_kernels_compile_for_a_gpu(name: str, method: str) -> None:
     """Without a warning."""
     pytest.importorskip("cuda.bindings")
     module = ball(True) if name == "ball" else compiled(name)
-    unit: Any = module.unit(RightSide(method=method, threads=True))
+    unit: Any = module.library(RightSide(method=method, threads=True))
     code, printed = compiling.ptx(unit.source, name, "compute_90")
     assert f".entry {unit.metadata.name}_motions(".encode() in code and b"fma.rn.f64" in code and not printed
     assert ("symdyn_search_step" in unit.source) == (name == "ball")
@@ -321,7 +321,7 @@ def test_kernels_compile_for_a_gpu(name: str, method: str) -> None:
 def test_the_stack_of_a_kernel_is_bounded() -> None:
     """A device sets the stack aside before a kernel begins: without recursion and without calls of addresses it is known."""
     pytest.importorskip("cuda.bindings")
-    unit: Any = compiled("cart_pole").unit(RightSide(threads=True))
+    unit: Any = compiled("cart_pole").library(RightSide(threads=True))
     assert "->function(" not in unit.source
     printed = compiling.report(unit.source, "cart_pole", "sm_90")
     found = re.search(r"Used \d+ registers, .* (\d+) bytes cumulative stack size", printed)
@@ -339,7 +339,7 @@ def test_the_drivers_calls(tmp_path: Path) -> None:
     """A driver whose memory and kernels are this processor's stands in for CUDA's; machine code of a GPU is loaded, C is run."""
     pytest.importorskip("cuda.bindings")
     module = compiled("double_pendulum")
-    unit: Any = module.unit(RightSide(threads=True))
+    unit: Any = module.library(RightSide(threads=True))
     compiling.cubin(unit.source, module.name, "sm_90")  # kept in the cache: the compiler looks for a driver, too
     driver = tmp_path / "libcuda.so.1"
     subprocess.run([*require_compiler().command, "-shared", "-fPIC", f"-DSIZE={ctypes.sizeof(Motions)}", "-o", str(driver),

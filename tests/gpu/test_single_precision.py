@@ -116,7 +116,7 @@ def test_what_single_precision_does_not_take(host: HostDevice) -> None:
 def test_kernels_compile_for_a_gpu(name: str, method: str) -> None:
     """Without a warning, with hardly a sum of doubles."""
     pytest.importorskip("cuda.bindings")
-    unit: Any = compiled(name).unit(RightSide(method=method, threads=True, looks=False, single=True))
+    unit: Any = compiled(name).library(RightSide(method=method, threads=True, looks=False, single=True))
     code, printed = compiling.ptx(unit.source, name, "compute_90")
     assert f".entry {unit.metadata.name}_motions(".encode() in code and not printed
     assert code.count(b"fma.rn.f32") > 100 > 10 * code.count(b"fma.rn.f64")

@@ -256,7 +256,7 @@ def test_texts_of_single_precision() -> None:
 def test_kernels_compile_for_a_gpu(name: str, single: bool) -> None:
     """Without a warning; in single precision with no sum or product of doubles but for reducing large angles."""
     pytest.importorskip("cuda.bindings")
-    unit: Any = compiled(name).unit(RightSide(threads=True, looks=False, integrated=False, single=single))
+    unit: Any = compiled(name).library(RightSide(threads=True, looks=False, integrated=False, single=single))
     code, printed = compiling.ptx(unit.source, name, "compute_90")
     assert f".entry {unit.metadata.name}_states(".encode() in code and b"_constants(" in code and not printed
     assert (b"fma.rn.f32" if single else b"fma.rn.f64") in code
@@ -291,7 +291,7 @@ def test_the_drivers_calls(tmp_path: Path) -> None:
     """A driver whose memory and kernels are this processor's stands in for CUDA's, with arrays that are on it."""
     pytest.importorskip("cuda.bindings")
     module = compiled("double_pendulum")
-    unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False))
+    unit: Any = module.library(RightSide(threads=True, looks=False, integrated=False))
     compiling.cubin(unit.source, module.name, "sm_90")  # kept in the cache: the compiler looks for a driver, too
     driver = tmp_path / "libcuda.so.1"
     subprocess.run([*require_compiler().command, "-shared", "-fPIC", f"-DSIZE={ctypes.sizeof(states.StateRows)}", "-o",

@@ -95,7 +95,7 @@ def test_several_results_are_one_call() -> None:
     recorder, _, entries = recorded(one + two, two * S, one)
     tape = Tape.of(recorder, all=np.array(entries, dtype=object))
     assert [n.op for n in tape.steps].count("call") == 1
-    assert tape.count()["kernel"] == 8
+    assert tape.count()["intrinsic"] == 8
 
 
 def test_calls_with_numbers_are_folded() -> None:

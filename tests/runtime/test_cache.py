@@ -28,7 +28,7 @@ from symdyn.runtime.building import cache, cache_folder, objects
 from symdyn.runtime.building import compiler as compilers
 from symdyn.runtime.building.cache import SUFFIX, build, cache_dir, load
 from symdyn.runtime.building.compiler import Compiler, find_compiler
-from symdyn.runtime.building.library import PythonUnit
+from symdyn.runtime.building.library import PythonLibrary
 from symdyn.runtime.building.recall import recall
 
 pytestmark = pytest.mark.skipif(
@@ -303,7 +303,7 @@ def test_a_full_disk_is_an_error_of_its_own(
         with monkeypatch.context() as patch:
             patch.setattr(*broken, full)
             with pytest.raises(CacheError, match=r"line-.* No space left on device\. Free some space"):
-                PythonUnit.from_source("METADATA = {}\n", "line")
+                PythonLibrary.from_source("METADATA = {}\n", "line")
     assert names(folder) == []
     with monkeypatch.context() as patch:
         folder.rmdir()
@@ -315,7 +315,7 @@ def test_a_full_disk_is_an_error_of_its_own(
 
 def test_long_names_fit_into_names_of_files(fake: Callable[[str], Compiler], folder: Path) -> None:
     assert build("a", "m" * 300, fake('cp "$3" "$2"')).parent == folder
-    assert PythonUnit.from_source("METADATA = {}\n", "m" * 300).module.METADATA == {}
+    assert PythonLibrary.from_source("METADATA = {}\n", "m" * 300).module.METADATA == {}
 
 
 # -- NumPy modules
@@ -331,7 +331,7 @@ def test_threads_that_write_the_same_module(folder: Path) -> None:
 
         def make(text: str = text, start: threading.Barrier = start) -> int:
             start.wait()
-            return int(PythonUnit.from_source(text, "line").module.K)
+            return int(PythonLibrary.from_source(text, "line").module.K)
 
         with ThreadPoolExecutor(8) as threads:
             assert {job.result() for job in [threads.submit(make) for _ in range(8)]} == {k}
@@ -362,24 +362,24 @@ def test_damaged_modules_are_written_again(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     monkeypatch.setattr(sys, "pycache_prefix", None)
     for _ in range(2):  # the second time from byte code
-        assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5
+        assert PythonLibrary.from_source(SOURCE, "line").module.SLOPE == 2.5
     (source,), (code,) = folder.glob("*.py"), folder.rglob("*.pyc")
     assert not (source.stat().st_mode | code.stat().st_mode) & 0o077
     stamp = source.stat()
     source.write_text(SOURCE.replace("2.5", "3.5"))
     os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
-    assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5 and source.read_text() == SOURCE
+    assert PythonLibrary.from_source(SOURCE, "line").module.SLOPE == 2.5 and source.read_text() == SOURCE
     whole = code.read_bytes()
     number = struct.pack("<d", 2.5)
     assert whole.count(number) == 1
     for damaged in (whole.replace(number, struct.pack("<d", 3.5)), whole[:-9] + bytes(9), whole[:70], b"", flipped(whole)):
         code.write_bytes(damaged)
         os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
-        assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5
+        assert PythonLibrary.from_source(SOURCE, "line").module.SLOPE == 2.5
     source.unlink()
     source.mkdir()
     with pytest.raises(CacheError, match="there is a folder of that name; remove it"):
-        PythonUnit.from_source(SOURCE, "line")
+        PythonLibrary.from_source(SOURCE, "line")
 
 
 def test_a_damaged_record_is_derived_again(folder: Path) -> None:

@@ -64,9 +64,9 @@ def test_velocity_constraints(name: str) -> None:
 
 def test_the_same_unit_without() -> None:
     pendulum = module("pendulum_absolute")
-    source = pendulum.unit("rhs").source
+    source = pendulum.library("rhs").source
     free, kept = (pendulum.simulate((0, 100), rtol=1e-6, stabilization=s) for s in ("none", "projection"))
-    assert pendulum.unit("rhs").source is source
+    assert pendulum.library("rhs").source is source
     assert worst(free)[0] > 1e-5 > 1e-12 > worst(kept)[0]
     assert free.corrections.position == 0.0 and free.corrections.n_evaluations == 0
     assert kept.energy_error() < free.energy_error()
@@ -137,7 +137,7 @@ def test_euler_parameters_keep_their_norm(backend: str) -> None:
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 @pytest.mark.parametrize("name", ["spatial_slider_crank", "top", "bricard", "driven"])
 def test_written_without_a_warning(name: str, tmp_path: Path) -> None:
-    source = module(name).unit("rhs").source
+    source = module(name).library("rhs").source
     (tmp_path / "unit.c").write_text(source)
     done = subprocess.run(["gcc", *STRICT, "unit.c"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -63,14 +63,14 @@ import json, sys
 from pathlib import Path
 from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.runtime.module import Module
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.runtime.building.compiler import find_compiler
 metadata = ModuleMetadata.of_plain(json.loads(Path("metadata.json").read_text()))
 def provide(what):
     name = what if isinstance(what, str) else "rhs"
     if {backend!r} == "numpy":
-        return PythonUnit.from_file(Path(name + ".py"))
-    return CUnit(Path(name + ".c").read_text(), Metadata.of_plain(json.loads(Path(name + ".json").read_text())),
+        return PythonLibrary.from_file(Path(name + ".py"))
+    return CLibrary(Path(name + ".c").read_text(), Metadata.of_plain(json.loads(Path(name + ".json").read_text())),
                  find_compiler())
 module = Module(metadata, provide, {backend!r})
 solution = module.simulate((0, 1), method="Radau")

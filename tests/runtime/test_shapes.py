@@ -427,7 +427,7 @@ def test_wrong_pictures_are_refused(solution: Solution) -> None:
                                ({"t": [0, 1], "view": [(0, 0)] * 3}, "3 views are given for 2 times")):
         with pytest.raises(ArgumentError, match=message):
             solution.picture(**arguments)
-    bare = Module(dataclasses.replace(solution.module.metadata, functions=("rhs",)), solution.module.unit, "numpy")
+    bare = Module(dataclasses.replace(solution.module.metadata, functions=("rhs",)), solution.module.library, "numpy")
     with pytest.raises(ArgumentError, match="there is nothing to draw"):
         bare.simulate((0.0, 0.1)).picture()
 

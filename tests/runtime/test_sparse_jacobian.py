@@ -28,7 +28,7 @@ def cable() -> Any:
 
 def matrix(module: Any, x: np.ndarray) -> np.ndarray:
     """The derivative from its entries."""
-    places = module.places_of_jacobian()
+    places = module.jacobian_indices()
     found = np.zeros((places.n, places.n))
     found[places.rows, places.columns] = module.evaluate("jacobian_x_packed", 0.0, x)
     return found
@@ -58,10 +58,10 @@ def test_entries_follow_differences(cable: Any) -> None:
 
 
 def test_where_factors_are_sparse(cable: Any) -> None:
-    assert cable.places_of_jacobian().sparse
-    assert len(cable.places_of_jacobian().rows) <= 26 * 29  # 6 entries of each neighbour, 12 of its own, 2 rates
-    assert not sd.systems.get("double_pendulum").compile().places_of_jacobian().sparse
-    assert sd.systems.get("four_bar").compile().places_of_jacobian() is None
+    assert cable.jacobian_indices().sparse
+    assert len(cable.jacobian_indices().rows) <= 26 * 29  # 6 entries of each neighbour, 12 of its own, 2 rates
+    assert not sd.systems.get("double_pendulum").compile().jacobian_indices().sparse
+    assert sd.systems.get("four_bar").compile().jacobian_indices() is None
 
 
 @pytest.mark.every_value
@@ -94,7 +94,7 @@ def test_inputs_that_vary() -> None:
     module = system.embedding().compile()
     given = {"inputs": lambda t, x: [np.sin(100 * t), 2.0], "rtol": 1e-8, "atol": 1e-10}
     found = [module.simulate([0, 0.02], method=method, **given).q[-1] for method in ("Radau", "radau5")]
-    assert module.places_of_jacobian().sparse and np.abs(found[0] - found[1]).max() <= 1e-8
+    assert module.jacobian_indices().sparse and np.abs(found[0] - found[1]).max() <= 1e-8
 
 
 def test_dense_matrices_that_are_too_large_are_refused(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -250,10 +250,10 @@ def test_jacobian_of_what_is_integrated(name: str, field: RightSide, mass: Any) 
     """Against differences of the same right-hand side, off the constraints; it is square, with the work, too."""
     module = mass if name == "held_mass" else constrained(name)
     p = np.append(module.parameters({"b": 2.0} if name == "held_mass" else None), [30.0] * field.baumgarte)
-    evaluators = [module.unit(field).evaluator(f) for f in ("rhs", "jacobian_x")]
+    evaluators = [module.library(field).evaluator(f) for f in ("rhs", "jacobian_x")]
     for evaluator in evaluators:
         evaluator.set_params(p)
-    n = module.unit(field).metadata.sizes.x
+    n = module.library(field).metadata.sizes.x
     x = np.random.default_rng(3).uniform(0.5, 1.0, n)
     inputs = np.array([0.7] * module.metadata.sizes.inputs)
     columns = []

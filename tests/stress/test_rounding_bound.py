@@ -11,7 +11,7 @@ import pytest
 
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler, plain
-from symdyn.runtime.building.library import CUnit
+from symdyn.runtime.building.library import CLibrary
 from symdyn.stress import attitude, rounding
 from symdyn.stress.coded import imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, set_aside
@@ -23,7 +23,7 @@ from symdyn.stress.statements import emitted, written_out
 from symdyn.stress.system_under_test import EPS, SystemUnderTest
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
+from symdyn.tape.intrinsics import SMOOTHED, Multipliers, Saddle
 from symdyn.tape.node import PARAMETER
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape
@@ -64,7 +64,7 @@ def found(measured: dict[str, rounding.Measured], source: Any, old: str = "", ne
     assert old in text
     compiler = find_compiler()
     assert compiler is not None
-    unit = CUnit(text.replace(old, new) if old else text, source.metadata, plain(compiler))
+    unit = CLibrary(text.replace(old, new) if old else text, source.metadata, plain(compiler))
     return [one.compared(one.run(unit.evaluator(name))) for name, one in measured.items()]
 
 
@@ -123,18 +123,19 @@ def test_algorithms_are_written_out_as_they_are(rank: int) -> None:
         C[2] = C[0] + 2 * C[1]
     M = B @ B.T
     scales = [*rng.uniform(0.5, 2, m), *rng.uniform(0.5, 2, n)]
-    for kernel, given in ((Saddle((n, m), ""), [SMOOTHED, *M[np.tril_indices(n)], *C.ravel(), *scales, *rng.normal(size=n + m)]),
-                          (Multipliers((n, m), ""), [*C.ravel(), *scales, *(C.T @ rng.normal(size=m))])):
-        if rank < m and isinstance(kernel, Saddle):
+    of_saddle = [SMOOTHED, *M[np.tril_indices(n)], *C.ravel(), *scales, *rng.normal(size=n + m)]
+    of_multipliers = [*C.ravel(), *scales, *(C.T @ rng.normal(size=m))]
+    for intrinsic, given in ((Saddle((n, m), ""), of_saddle), (Multipliers((n, m), ""), of_multipliers)):
+        if rank < m and isinstance(intrinsic, Saddle):
             given[-1] = given[-3] + 2 * given[-2]  # of rows that do not contradict each other
         r = Recorder()
         values = {f"v{k}": v for k, v in enumerate(given)}
-        first = [Fraction(given[0])] if isinstance(kernel, Saddle) else []
-        results = r.call(kernel, [*first, *[r.leaf(f"v{k}", PARAMETER << 2) for k in range(len(first), len(given))]])
+        first = [Fraction(given[0])] if isinstance(intrinsic, Saddle) else []
+        results = r.call(intrinsic, [*first, *[r.leaf(f"v{k}", PARAMETER << 2) for k in range(len(first), len(given))]])
         whole = written_out(Tape.of(r, x=results))
         assert whole.smooths and not any(node.op == "call" for node in whole.tape.steps)
         exact = np.array(evaluate(whole.tape, values, 32)["x"], dtype=float)
-        np.testing.assert_allclose(exact, kernel.rows(given), rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(exact, intrinsic.rows(given), rtol=1e-8, atol=1e-9)
         bound = first_order(whole.tape, values, 1).of("c")[0]
         errors = np.abs(evaluate_rows(whole.tape, values, 1)["x"][0] - exact)
         assert (errors < bound).all() and bound.max() < 1e-8

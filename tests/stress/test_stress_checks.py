@@ -360,10 +360,10 @@ def test_stops_and_refusals_at_singular_positions_must_name_the_culprit() -> Non
     def refuses(message: str) -> Any:
         raise sd.SymdynError(message)
 
-    assert singular._refused("massless", "tip", lambda: refuses("joint wrist has no mass"), ("wrist",)).verdict == "degrade"
-    assert singular._refused("massless", "tip", lambda: refuses("it went wrong"), ("wrist",)).verdict == FAIL
+    assert singular._rejected("massless", "tip", lambda: refuses("joint wrist has no mass"), ("wrist",)).verdict == "degrade"
+    assert singular._rejected("massless", "tip", lambda: refuses("it went wrong"), ("wrist",)).verdict == FAIL
     moves = type("Sol", (Stopped,), {"success": True, "module": type("Module", (), {"name": "arm"})})
-    assert "as if nothing were wrong" in singular._refused("massless", "tip", lambda: moves, ("wrist",)).why
+    assert "as if nothing were wrong" in singular._rejected("massless", "tip", lambda: moves, ("wrist",)).why
 
 
 @needs_c

@@ -16,7 +16,7 @@ from symdyn.tape import Recorder, Tape
 from symdyn.tape.catenary import Catenary
 from symdyn.tape.cube import Cube
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.kernels import LOOSE, SMOOTHED, Kernel, Multipliers, Saddle
+from symdyn.tape.intrinsics import LOOSE, SMOOTHED, Intrinsic, Multipliers, Saddle
 from symdyn.tape.node import INPUT
 from tests.backend.c_warnings import RUNTIME
 
@@ -124,29 +124,29 @@ def broken(rng: np.random.Generator, rows: np.ndarray) -> np.ndarray:
 # -- both texts
 
 
-Compiled = Callable[[Kernel, np.ndarray], tuple[np.ndarray, np.ndarray]]
+Compiled = Callable[[Intrinsic, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @pytest.fixture(scope="module")
 def in_c(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
-    """kernel, rows of values (n, n_in) -> results (n, n_out), and where there are none."""
-    def run(kernel: Kernel, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """intrinsic, rows of values (n, n_in) -> results (n, n_out), and where there are none."""
+    def run(intrinsic: Intrinsic, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         folder = tmp_path_factory.mktemp("c")
         numbers = {"LOOSE": LOOSE, "MASSLESS": 1e-12, "ROUNDS": 5, "CLEANINGS": 2, "SMOOTHED": SMOOTHED}
-        sizes = kernel.sizes if len(kernel.sizes) == 2 else (1, 1)
+        sizes = intrinsic.sizes if len(intrinsic.sizes) == 2 else (1, 1)
         for name in ("SADDLE", "MULTIPLIERS"):
             numbers |= {f"{name}_N": sizes[0], f"{name}_M": sizes[1], f"{name}_ONE_SIZE": 0}
         head = "".join(f"#define SYMDYN_{name} {value!r}\n" for name, value in numbers.items())
-        given = "".join(f"{size}, " for size in kernel.sizes)
+        given = "".join(f"{size}, " for size in intrinsic.sizes)
         (folder / "main.c").write_text(
-            f'{head}#define SYMDYN_LINKED static\n#include "{kernel.name}.h"\n'
+            f'{head}#define SYMDYN_LINKED static\n#include "{intrinsic.name}.h"\n'
             f"void run(int n, const double *in, double *out, int *codes) {{\n"
             f"    for (int k = 0; k < n; k++)\n"
-            f"        codes[k] = {kernel.name}({given}in + k * {values.shape[1]}, out + k * {kernel.n_out});\n}}\n")
+            f"        codes[k] = {intrinsic.name}({given}in + k * {values.shape[1]}, out + k * {intrinsic.n_out});\n}}\n")
         command = [*require_compiler().command, "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", f"-I{RUNTIME}",
                    "-o", folder / "main.so", folder / "main.c", "-lm"]
         subprocess.run(command, check=True, capture_output=True)
-        out, codes = np.full((len(values), kernel.n_out), np.nan), np.zeros(len(values), dtype=np.intc)
+        out, codes = np.full((len(values), intrinsic.n_out), np.nan), np.zeros(len(values), dtype=np.intc)
         library = ctypes.CDLL(str(Path(folder / "main.so")))
         pointers = [np.ascontiguousarray(a).ctypes.data_as(ctypes.c_void_p) for a in (values, out, codes)]
         library.run(len(values), *pointers)
@@ -155,7 +155,7 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
     return run
 
 
-KERNELS: dict[str, tuple[Kernel, Callable[[], np.ndarray]]] = {
+KERNELS: dict[str, tuple[Intrinsic, Callable[[], np.ndarray]]] = {
     **{f"saddle {n} {m}": (Saddle((n, m), ""), lambda n=n, m=m: saddle_points(n, m)) for n, m in SIZES},
     "saddle of a chain": (Saddle((12, 9), ""), lambda: chains(12, 9)),
     **{f"multipliers {n} {m}": (Multipliers((n, m), ""), lambda n=n, m=m: forces(n, m)) for n, m in SIZES},
@@ -168,40 +168,40 @@ KERNELS: dict[str, tuple[Kernel, Callable[[], np.ndarray]]] = {
 @pytest.mark.native
 @pytest.mark.parametrize("name", KERNELS)
 def test_c_and_python_give_the_same_bits_and_reject_the_same(name: str, in_c: Compiled) -> None:
-    kernel, inputs = KERNELS[name]
+    intrinsic, inputs = KERNELS[name]
     values = inputs()
-    expected, rejected = in_c(kernel, values)
-    found = kernel.rows(values.T)
+    expected, rejected = in_c(intrinsic, values)
+    found = intrinsic.rows(values.T)
     expected[rejected] = np.nan
     np.testing.assert_array_equal(found, expected)
     assert 0.3 < np.isfinite(found).all(axis=1).mean() < 1
     for k in range(0, len(values), 97):  # state by state as all at once
-        np.testing.assert_array_equal(kernel.rows(values[k].tolist()), found[k])
+        np.testing.assert_array_equal(intrinsic.rows(values[k].tolist()), found[k])
 
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_generated_python_has_the_text_of_the_package(name: str) -> None:
     """The same bits; what is rejected raises, and tells at which states."""
-    kernel, inputs = KERNELS[name]
+    intrinsic, inputs = KERNELS[name]
     values = inputs()[::3]
     recorder = Recorder()
     names = [f"v{k}" for k in range(values.shape[1])]
-    tape = Tape.of(recorder, solve=recorder.call(kernel, [recorder.leaf(n, INPUT) for n in names]))
+    tape = Tape.of(recorder, solve=recorder.call(intrinsic, [recorder.leaf(n, INPUT) for n in names]))
     groups = {group: names if group == "inputs" else [] for group in ("q", "u", "z", "ud", "inputs", "p")}
-    content = Content("kernels", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
+    content = Content("intrinsics", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
     text, = render(content, "numpy", standalone=False, integrator=False).files.values()
-    module: dict[str, object] = {"__name__": "kernels"}
+    module: dict[str, object] = {"__name__": "intrinsics"}
     exec(text, module)
-    expected = kernel.rows(values.T)
+    expected = intrinsic.rows(values.T)
     rejected = np.isnan(expected).any(axis=1)
-    solve, failure = module[kernel.name], module["SingularError"]
+    solve, failure = module[intrinsic.name], module["SingularError"]
     assert callable(solve) and isinstance(failure, type) and issubclass(failure, ArithmeticError)
-    np.testing.assert_array_equal(np.array(solve(*kernel.sizes, list(values[~rejected].T), 1)).T, expected[~rejected])
-    if isinstance(kernel, Multipliers):  # there are always some, but of what is no number
-        assert not np.isfinite(np.array(solve(*kernel.sizes, list(values.T), 1)).T[rejected]).all(axis=1).any()
+    np.testing.assert_array_equal(np.array(solve(*intrinsic.sizes, list(values[~rejected].T), 1)).T, expected[~rejected])
+    if isinstance(intrinsic, Multipliers):  # there are always some, but of what is no number
+        assert not np.isfinite(np.array(solve(*intrinsic.sizes, list(values.T), 1)).T[rejected]).all(axis=1).any()
         return
     with pytest.raises(failure) as caught:
-        solve(*kernel.sizes, list(values.T), 1)
+        solve(*intrinsic.sizes, list(values.T), 1)
     states = caught.value.states  # type: ignore[attr-defined]
     assert states.any() and not states[~rejected].any()
 
@@ -209,16 +209,16 @@ def test_generated_python_has_the_text_of_the_package(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in KERNELS if name.startswith(("saddle", "multipliers"))])
 def test_statements_are_those_of_the_text(name: str) -> None:
     """Recorded on a tape, for bounds of rounding errors; e is divided by there by multiplying with its inverse."""
-    kernel, inputs = KERNELS[name]
+    intrinsic, inputs = KERNELS[name]
     values = inputs()[::35]  # the regular ones
     recorder = Recorder()
     names = [f"v{k}" for k in range(values.shape[1])]
     leaves: list = [recorder.leaf(n, INPUT) for n in names]
-    if isinstance(kernel, Saddle):
+    if isinstance(intrinsic, Saddle):
         values[:, 0] = leaves[0] = SMOOTHED
-    found = kernel.statements(recorder, leaves)
+    found = intrinsic.statements(recorder, leaves)
     rows = evaluate_rows(Tape.of(recorder, solve=found), dict(zip(names, values.T, strict=True)), len(values))["solve"]
-    expected = kernel.rows(values.T)
+    expected = intrinsic.rows(values.T)
     regular = np.isfinite(expected).all(axis=1)
     assert regular.mean() > 0.9
     errors = np.abs(rows - expected)[regular].max(axis=1) / np.abs(expected[regular]).max(axis=1)

@@ -16,7 +16,7 @@ from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
 from symdyn.exact.prove import zero
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.catenary import Catenary, potential
 from symdyn.tape.differentiate import forward
@@ -248,12 +248,12 @@ def unit(backend: str) -> Any:
     source = render(content, backend, standalone=False, integrator=False)
     text = next(iter(source.files.values()))
     if backend == "numpy":
-        made: Any = PythonUnit.from_source(text, "line")
+        made: Any = PythonLibrary.from_source(text, "line")
     else:
         compiler = find_compiler()
         if compiler is None:
             pytest.skip("no C compiler here")
-        made = CUnit(text, source.metadata, compiler)
+        made = CLibrary(text, source.metadata, compiler)
     evaluator = made.evaluator("solve")
     evaluator.set_params(np.zeros(0))
     return evaluator

@@ -13,7 +13,7 @@ import pytest
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError, UnsupportedExpression
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.cube import Cube
 from symdyn.tape.differentiate import forward, reverse
@@ -89,14 +89,14 @@ def difference(context: Any, e: Sequence[Any], index: tuple[int, ...], h: Any) -
 def test_against_the_sum_over_corners(order: int) -> None:
     context = mpmath.mp.clone()
     context.dps = 80
-    kernel = Cube((order,), "")
+    intrinsic = Cube((order,), "")
     for e in random_depths((40, 30, 12)[order], order):
         exact = list(map(context.mpf, e.tolist()))
-        wanted = [difference(context, exact, index, context.mpf(10) ** -16) for index in kernel.indices]
-        precise = kernel.precise(context, exact)
+        wanted = [difference(context, exact, index, context.mpf(10) ** -16) for index in intrinsic.indices]
+        precise = intrinsic.precise(context, exact)
         size = max(map(abs, wanted)) or 1
         assert max(abs(a - b) for a, b in zip(precise, wanted, strict=True)) < 1e-20 * size
-        found = kernel.rows(e.tolist())
+        found = intrinsic.rows(e.tolist())
         wanted_floats = np.array(list(map(float, wanted)))
         scale = (1.0, 1 / np.abs(e[1:]).max(), np.abs(wanted_floats).max())[order]
         assert np.abs(found - wanted_floats).max() < (2e-15, 1e-14, 1e-12)[order] * scale
@@ -188,12 +188,12 @@ def evaluator(request: pytest.FixtureRequest) -> Any:
     text = next(iter(source.files.values()))
     unit: Any
     if request.param == "numpy":
-        unit = PythonUnit.from_source(text, "cubes")
+        unit = PythonLibrary.from_source(text, "cubes")
     else:
         compiler = find_compiler()
         if compiler is None:
             pytest.skip("no C compiler here")
-        unit = CUnit(text, source.metadata, compiler)
+        unit = CLibrary(text, source.metadata, compiler)
     made = unit.evaluator("cube")
     made.set_params(np.zeros(0))
     return made

@@ -13,7 +13,7 @@ from flint import ctx as context
 from symdyn import systems
 from symdyn.functions.tapes import function_tape
 from symdyn.tape.evaluate import evaluate
-from symdyn.tape.kernels import SMOOTHED, Saddle
+from symdyn.tape.intrinsics import SMOOTHED, Saddle
 from symdyn.tape.node import COORDINATE
 from symdyn.tape.quick import evaluate_quickly
 from symdyn.tape.recorder import Recorder

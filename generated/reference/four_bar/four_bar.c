@@ -167,7 +167,7 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
     }
 }
 
-// Multipliers of least norm; see Multipliers in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
+// Multipliers of least norm; see Multipliers in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes of
 // all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
 
 // Factors of symmetric matrices: shared by symdyn_saddle.h and symdyn_multipliers.h.
@@ -284,8 +284,8 @@ SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam
     return 0;
 }
 
-// The iterated augmented Lagrangian; see Saddle in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
-// all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with SYMDYN_SADDLE_ONE_SIZE those of each.
+// The iterated augmented Lagrangian; see Saddle in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes
+// of all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with SYMDYN_SADDLE_ONE_SIZE those of each.
 
 // Whether a pivot of the symmetric A, which is used up, is next to nothing of its entry: nothing holds some direction then.
 // The pivot that is the largest part of its entry goes first, so that rounding stays small.
@@ -553,7 +553,7 @@ static int four_bar_rhs_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// rhs where one does, or nearly so: 443 operations (39 add, 357 kernel, 41 mul, 6 trig); longest chain 12.
+// rhs where one does, or nearly so: 443 operations (39 add, 357 intrinsic, 41 mul, 6 trig); longest chain 12.
 static int four_bar_rhs_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -903,7 +903,7 @@ static int four_bar_lam_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// lam where one does, or nearly so: 727 operations (48 add, 623 kernel, 50 mul, 6 trig); longest chain 17.
+// lam where one does, or nearly so: 727 operations (48 add, 623 intrinsic, 50 mul, 6 trig); longest chain 17.
 static int four_bar_lam_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -1206,7 +1206,7 @@ static int four_bar_reactions_regular(const double *q, const double *u, const do
     return 0;
 }
 
-// reactions where one does, or nearly so: 823 operations (92 add, 623 kernel, 102 mul, 6 trig); longest chain 24.
+// reactions where one does, or nearly so: 823 operations (92 add, 623 intrinsic, 102 mul, 6 trig); longest chain 24.
 static int four_bar_reactions_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];

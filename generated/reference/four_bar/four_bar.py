@@ -289,7 +289,7 @@ class _OneState:
             raise SingularError(code)
 
     @staticmethod
-    def otherwise(error, regular, singular, arguments):
+    def singular_fallback(error, regular, singular, arguments):
         return singular(*arguments)
 
 
@@ -309,7 +309,7 @@ class _ManyStates:
             raise SingularError(code, np.logical_not(value > 0.0))
 
     @staticmethod
-    def otherwise(error, regular, singular, arguments):
+    def singular_fallback(error, regular, singular, arguments):
         """What `regular` gives at the states where it does not fail, and `singular` at the others; error: of `regular` at all."""
         t, *groups = arguments
         shape = np.broadcast_shapes(np.shape(t), *[np.shape(value) for group in groups for value in group])
@@ -512,7 +512,7 @@ def _define(m):
 
     def rhs_singular(t, q, u, z, ud, inputs, p, c):
         # x_dot = f(t, x) with x = [q; u; z]: M_tilde u_dot = F_tilde - k_tilde
-        # 443 operations (39 add, 357 kernel, 41 mul, 6 trig); longest chain 12.
+        # 443 operations (39 add, 357 intrinsic, 41 mul, 6 trig); longest chain 12.
         # joint hinge1
         q1 = q[0]
         cos_q1 = cos(q1)
@@ -608,7 +608,7 @@ def _define(m):
         try:
             return rhs_regular(*arguments)
         except SingularError as error:
-            return m.otherwise(error, rhs_regular, rhs_singular, arguments)
+            return m.singular_fallback(error, rhs_regular, rhs_singular, arguments)
 
     def C(t, q, u, z, ud, inputs, p, c):
         # constraints, zero where they hold; 0 in rows of velocity constraints
@@ -820,7 +820,7 @@ def _define(m):
 
     def lam_singular(t, q, u, z, ud, inputs, p, c):
         # multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde
-        # 727 operations (48 add, 623 kernel, 50 mul, 6 trig); longest chain 17.
+        # 727 operations (48 add, 623 intrinsic, 50 mul, 6 trig); longest chain 17.
         # joint hinge1
         q1 = q[0]
         cos_q1 = cos(q1)
@@ -923,7 +923,7 @@ def _define(m):
         try:
             return lam_regular(*arguments)
         except SingularError as error:
-            return m.otherwise(error, lam_regular, lam_singular, arguments)
+            return m.singular_fallback(error, lam_regular, lam_singular, arguments)
 
     def reactions_regular(t, q, u, z, ud, inputs, p, c):
         # force and moment of every joint on its child, at the joint's point on it, n-frame
@@ -1110,7 +1110,7 @@ def _define(m):
 
     def reactions_singular(t, q, u, z, ud, inputs, p, c):
         # force and moment of every joint on its child, at the joint's point on it, n-frame
-        # 823 operations (92 add, 623 kernel, 102 mul, 6 trig); longest chain 24.
+        # 823 operations (92 add, 623 intrinsic, 102 mul, 6 trig); longest chain 24.
         # joint hinge1
         q1 = q[0]
         sin_q1 = sin(q1)
@@ -1284,7 +1284,7 @@ def _define(m):
         try:
             return reactions_regular(*arguments)
         except SingularError as error:
-            return m.otherwise(error, reactions_regular, reactions_singular, arguments)
+            return m.singular_fallback(error, reactions_regular, reactions_singular, arguments)
 
     return {"rhs": rhs, "C": C, "C_r": C_r, "F_d": F_d, "lam": lam, "reactions": reactions, "prologue": prologue}
 

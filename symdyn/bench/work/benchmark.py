@@ -212,10 +212,10 @@ def finished(tested: SystemUnderTest, asked: Asked, folder: Path, command: str) 
     data = resume.whole(folder / RESULTS, command)
     tested = replace(tested, at=asked.at)
     with contextlib.suppress(*DAMAGED, SymdynError):  # damaged, or nothing can be derived
-        found = Benchmark.of(data)
+        result = Benchmark.of(data)
         formulations, _, first, _ = _formulated(tested, asked)
-        if found.fingerprint == _fingerprint(_motion(tested, first), found.reference, _differ(first, formulations)):
-            return found
+        if result.fingerprint == _fingerprint(_motion(tested, first), result.reference, _differ(first, formulations)):
+            return result
     return None
 
 

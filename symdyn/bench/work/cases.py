@@ -91,19 +91,19 @@ def named(name: str, options: Mapping[str, Any] | None = None) -> Case:
     """
     case, options = CASES.get(name), dict(options or {})
     if case is None:
-        found = re.fullmatch(r"(\w+)(?:\((\w+)\))?", name)
-        if found is None or found[1] not in systems.names():
+        result = re.fullmatch(r"(\w+)(?:\((\w+)\))?", name)
+        if result is None or result[1] not in systems.names():
             near = difflib.get_close_matches(name, known(), 3)
             hint = f"did you mean {' or '.join(near)}? There are" if near else "there are"
             raise Unknown(f"there is no mechanism {name!r}; {hint} {', '.join(known())}")
-        case = Case(found[1])
-        if found[2]:
+        case = Case(result[1])
+        if result[2]:
             first = next(iter(inspect.signature(case.maker()).parameters), None)
             if first is None:
-                raise ArgumentError(f"{found[1]} takes no option, found {name!r}")
+                raise ArgumentError(f"{result[1]} takes no option, found {name!r}")
             if first in options:
                 raise ArgumentError(f"the option {first} is given twice: {name} and {first}={options[first]}")
-            options[first] = int(found[2]) if found[2].isdigit() else {"True": True, "False": False}.get(found[2], found[2])
+            options[first] = int(result[2]) if result[2].isdigit() else {"True": True, "False": False}.get(result[2], result[2])
     wrong = wrong_option(name.partition("(")[0], case.maker(), options)
     if wrong:
         raise ArgumentError(wrong)

@@ -103,8 +103,8 @@ def free_body(times: Sequence[float]) -> list[list[float]]:
             u = rate * mpf(t) + u0
             quarters = mpmath.floor((u + K) / (2 * K))
             amplitude = (-1)**int(quarters) * mpmath.asin(w2 / A2) + quarters * mpmath.pi
-            near, found = mpmath.pi / 2 - amplitude, mpmath.atan2(I1 * w1, I2 * w2)
-            spin = found + 2 * mpmath.pi * mpmath.nint((near - found) / (2 * mpmath.pi))
+            near, result = mpmath.pi / 2 - amplitude, mpmath.atan2(I1 * w1, I2 * w2)
+            spin = result + 2 * mpmath.pi * mpmath.nint((near - result) / (2 * mpmath.pi))
             tilt, turning = mpmath.acos(I3 * w3 / L), precession(mpf(t))
             rows.append([float(v) for v in (turned, tilt, spin, turning, w1 * cos(spin) - w2 * sin(spin),
                                             w3 - turning * cos(tilt))])
@@ -113,11 +113,11 @@ def free_body(times: Sequence[float]) -> list[list[float]]:
 
 def _integrals(rate: Callable[[Any], Any], times: Sequence[float], quarter: Any) -> list[Any]:
     """Integrals of a rate from 0 to every time, in pieces of about a quarter of its period."""
-    total, now, found = mpmath.mpf(0), mpmath.mpf(0), []
+    total, now, result = mpmath.mpf(0), mpmath.mpf(0), []
     for t in times:
         goal = mpmath.mpf(t)
         pieces = max(1, int(mpmath.ceil((goal - now) / quarter)))
         total += mpmath.quad(rate, mpmath.linspace(now, goal, pieces + 1))
         now = goal
-        found.append(total)
-    return found
+        result.append(total)
+    return result

@@ -118,13 +118,13 @@ def nothing(result: Benchmark) -> str:
 
 def _systems(names: Sequence[str], find: Callable[[str], SystemUnderTest]) -> tuple[list[SystemUnderTest], list[str]]:
     """What is measured, and what is wrong with the names."""
-    found, faults = [], []
+    result, faults = [], []
     for name in names:
         try:
-            found.append(find(name))
+            result.append(find(name))
         except SymdynError as error:
             faults.append(str(error))
-    return found, faults
+    return result, faults
 
 
 def _place(folder: Path, one: SystemUnderTest, systems: Sequence[SystemUnderTest]) -> Path:

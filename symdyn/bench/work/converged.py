@@ -65,7 +65,7 @@ def states(formulation: Formulation, times: Sequence[float], digits: int, until:
         log(float(t))
         return precise.projected(t, x)
 
-    now, found = context.mpf(0), []
+    now, result = context.mpf(0), []
     x = precise.projected(now, precise.start)
     for t in times:
         goal = context.mpf(float(t))
@@ -75,8 +75,8 @@ def states(formulation: Formulation, times: Sequence[float], digits: int, until:
         except ArithmeticError as error:  # of the integrator and of numbers
             raise quad.TooRough(f"the motion at {digits} digits stops: {error}") from None
         now = goal
-        found.append(x)
-    return found
+        result.append(x)
+    return result
 
 
 def expected_seconds(formulation: Formulation, end: float, digits: int = DIGITS) -> float:

@@ -45,9 +45,9 @@ def find_reference(tested: SystemUnderTest, formulations: Sequence[Formulation],
     first, times = formulations[0], default_times(tested)
     if tested.closed is not None:
         return Reference("closed form", tuple(times), tested.closed(times), 15.9, tested.source, first.coordinates)
-    found = store.find(tested.name, first, times)
-    if found is not None:
-        return found
+    result = store.find(tested.name, first, times)
+    if result is not None:
+        return result
     why = ""
     try:
         expected = expected_seconds(first, tested.end)

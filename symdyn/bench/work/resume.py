@@ -19,7 +19,7 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.building.compiler import find_compiler
 
 # Folders of the package that shape neither the code that runs nor how it is measured.
-_BESIDE = ("cli", "comparison", "lecture", "report", "stress")
+_NEARBY = ("cli", "comparison", "lecture", "report", "stress")
 
 
 def about() -> dict[str, str]:
@@ -47,7 +47,7 @@ def code() -> str:
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
     return digest({path.relative_to(folder).as_posix(): path for folder in folders
                    for ending in ("*.py", "*.jinja", "*.toml", "*.h", "*.c") for path in folder.rglob(ending)
-                   if path.relative_to(folder).parts[0] not in _BESIDE})
+                   if path.relative_to(folder).parts[0] not in _NEARBY})
 
 
 def digest(files: Mapping[str, Path]) -> str:

@@ -43,9 +43,9 @@ def on_constraints(tested: SystemUnderTest, first: Formulation) -> tuple[SystemU
     except ArgumentError:
         pass
     n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
-    found = np.concatenate(module.consistent(x[:n_q], x[n_q:n_q + n_u]))
+    result = np.concatenate(module.consistent(x[:n_q], x[n_q:n_q + n_u]))
     symbols = first.equations.symbols
-    start = dict(zip((*symbols.coordinates, *symbols.speeds), map(float, found), strict=True))
+    start = dict(zip((*symbols.coordinates, *symbols.speeds), map(float, result), strict=True))
     changed = [f"{symbol.name} from {before:.6g} to {after:.6g}" for (symbol, after), before in zip(
         start.items(), map(float, x), strict=False) if abs(after - before) > _CHANGED * max(1.0, abs(before))]
     note = f"the initial state violates the constraints; the motion begins at the nearest one that does not: {', '.join(changed)}"

@@ -97,12 +97,12 @@ class SystemUnderTest:
         if self.given is not None:
             touches = bool(self.given.contacts)
             return [Formulation(GIVEN, self.given)] * (not touches), [Skipped(GIVEN, "", TOUCHES)] * touches
-        found: list[Formulation] = []
+        result: list[Formulation] = []
         skipped: list[Skipped] = []
         for name in asked or self.names:
             made = self._formulated(name, bool(asked))
-            (skipped if isinstance(made, Skipped) else found).append(made)  # type: ignore[arg-type]
-        return found, skipped
+            (skipped if isinstance(made, Skipped) else result).append(made)  # type: ignore[arg-type]
+        return result, skipped
 
     def first(self) -> Formulation:
         """The first formulation that the mechanism has: its coordinates are the reference's.
@@ -110,9 +110,9 @@ class SystemUnderTest:
         Raises SymdynError if there is none.
         """
         for name in self.names:
-            found, skipped = self.formulated([name])
-            if found:
-                return found[0]
+            result, skipped = self.formulated([name])
+            if result:
+                return result[0]
         raise SymdynError(f"{self.name} has no formulation: {skipped[-1]}")
 
     def _formulated(self, name: str, asked: bool) -> Formulation | Skipped:
@@ -159,19 +159,20 @@ class Comparison:
         if len(x) == 0:
             return np.full(total, NAN), np.full(total, NAN)
         ours, known = self._parts(formulation, x), self._parts(self.first, self.x, formulation)
-        found = []
+        result = []
         for mine, theirs in zip(ours, known, strict=True):
             size = np.linalg.norm(theirs, axis=1).max(initial=0.0) or 1.0
             row = np.full(total, NAN)
             row[:n] = np.linalg.norm(mine - theirs[:n], axis=1) / size
-            found.append(row)
-        return found[0], found[1]
+            result.append(row)
+        return result[0], result[1]
 
-    def _parts(self, formulation: Formulation, x: np.ndarray, beside: Formulation | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def _parts(self, formulation: Formulation, x: np.ndarray,
+               reference: Formulation | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Positions and speeds, (n, ...): of bodies where the coordinates are not the reference's."""
         sizes = formulation.module.metadata.sizes
         n_q, n_u = sizes.q, sizes.u
-        if not self.bodies and (beside or formulation).coordinates == self.first.coordinates:
+        if not self.bodies and (reference or formulation).coordinates == self.first.coordinates:
             return np.hstack((x[:, :n_q], x[:, n_q + n_u:])), x[:, n_q:n_q + n_u]
         module, there = formulation.module, np.isfinite(x).all(axis=1)
         unknown = np.full((len(x), 1), NAN)
@@ -180,7 +181,7 @@ class Comparison:
         t, x = self.times[:len(x)][there], x[there]
         given = np.array([float(module.metadata.initial.get(n, 0.0)) for n in module.metadata.inputs])
         p = module.default_parameters
-        places = self._shared(formulation, beside or formulation)
+        places = self._shared(formulation, reference or formulation)
         try:
             frames = module.evaluate("frames", t, x, p, given).reshape(len(x), -1, 12)[:, places]
             J = module.evaluate("J", t, x, p, given).reshape(len(x), len(module.metadata.bodies), -1, n_u)[:, places]
@@ -199,6 +200,6 @@ class Comparison:
 
 def _spread(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Rows (m, ...) at the m places (n,) that are true; others are not numbers."""
-    found = np.full((len(places), rows.shape[1]), NAN)
-    found[places] = rows
-    return found
+    result = np.full((len(places), rows.shape[1]), NAN)
+    result[places] = rows
+    return result

@@ -29,10 +29,10 @@ class Timing:
     seconds: dict[int, list[float]] = field(default_factory=dict)
     evaluations: dict[int, int] = field(default_factory=dict)
 
-    def add(self, place: int, run: Pass, repeats: int) -> None:
+    def add(self, index: int, run: Pass, repeats: int) -> None:
         """Time a run for the first time."""
-        self.runs[place], self.seconds[place] = run, []
-        self._repeat(place, repeats)
+        self.runs[index], self.seconds[index] = run, []
+        self._repeat(index, repeats)
 
     def again(self, row: Row, repeats: int) -> Row:
         """One more pass; the row with its figures."""
@@ -54,9 +54,9 @@ class Timing:
         return replace(row, seconds=statistics.median(seconds), least=min(seconds), repeats=len(seconds),
                        evaluations=self.evaluations[end], until=tuple(until))
 
-    def _repeat(self, place: int, repeats: int) -> None:
-        seconds, self.evaluations[place] = self.runs[place](repeats)
-        self.seconds[place] += seconds
+    def _repeat(self, index: int, repeats: int) -> None:
+        seconds, self.evaluations[index] = self.runs[index](repeats)
+        self.seconds[index] += seconds
 
 
 def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:

@@ -154,13 +154,13 @@ class _Recorded:
 class _Coordinates(ConstrainedByHand, Motion):
     """Coordinates whose mass matrix is constant; the speeds are their derivatives."""
 
-    def __init__(self, recorded: _Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None,
+    def __init__(self, recorded: _Recorded, intrinsic: bool = False, independent: tuple[int, ...] | None = None,
                  pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         symbols = recorded.symbols
         super().__init__(recorded.algebra, symbols.coordinates, symbols.speeds, recorded.rates, (), symbols.inputs,
                          symbols.parameters)
         self.recorded = recorded
-        self.constrain(recorded.rows, kernel, independent, pivots)
+        self.constrain(recorded.rows, intrinsic, independent, pivots)
 
     def quantities(self) -> dict[str, Any]:
         own = {"k_tilde": self.k_tilde, "F_tilde": lambda: self.recorded.F, "kinetic_energy": self.kinetic_energy,
@@ -194,13 +194,13 @@ def _derive(description: _Description) -> AugmentedEquations:
     recorded = _Recorded(description)
     rows = recorded.rows
 
-    def result(quantities: Constrained, otherwise: Equations | None) -> AugmentedEquations:
+    def result(quantities: Constrained, singular_fallback: Equations | None) -> AugmentedEquations:
         return AugmentedEquations(description.name, "augmented", True, description.symbols, recorded.algebra.recorder,
                                   recorded.algebra.leaves, quantities.quantities(), again=partial(_derive, description),
                                   constraints=tuple(r.name for r in rows), holonomic=tuple(r.holonomic for r in rows),
-                                  otherwise=otherwise)
+                                  singular_fallback=singular_fallback)
 
-    faults = contradictions(result(_Coordinates(recorded, kernel=True), None))
+    faults = contradictions(result(_Coordinates(recorded, intrinsic=True), None))
     if faults:
         raise ModelError(faults, description.name)
     return choose(lambda *way: _Coordinates(recorded, *way), result, search_near)
@@ -217,7 +217,7 @@ def search_near(equations: Equations) -> Ranks | None:
     begin = {q: float(symbols.initial.get(q, 0.0)) for q in symbols.coordinates}
     for k in range(STARTS):
         near = {q: value + (k > 0) * stream.uniform(-1, 1) * (1 + abs(value)) for q, value in begin.items()}
-        found = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=near)))
-        if found is not None:
-            return found
+        result = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=near)))
+        if result is not None:
+            return result
     return None

@@ -13,11 +13,11 @@ from symdyn.formulation.constraints.rows import Row
 class ConstrainedByHand(Constrained):
     """Mixed in before a Motion whose mass and forces were given."""
 
-    def constrain(self, rows: Sequence[Row], kernel: bool, independent: tuple[int, ...] | None,
+    def constrain(self, rows: Sequence[Row], intrinsic: bool, independent: tuple[int, ...] | None,
                   pivots: tuple[tuple[int, int], ...] | None) -> None:
         """Take the rows of the constraints, and in which way they are solved."""
         self.rows = list(rows)
-        self.kernel, self.independent, self.pivots = kernel, independent, pivots
+        self.intrinsic, self.independent, self.pivots = intrinsic, independent, pivots
 
     @cached_property
     def length(self) -> Any:

@@ -241,10 +241,10 @@ class _Matrices(Motion):
 class _ConstrainedMatrices(ConstrainedByHand, _Matrices):
     """Quantities of equations with constraints."""
 
-    def __init__(self, recorded: Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None,
+    def __init__(self, recorded: Recorded, intrinsic: bool = False, independent: tuple[int, ...] | None = None,
                  pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         super().__init__(recorded)
-        self.constrain(recorded.rows, kernel, independent, pivots)
+        self.constrain(recorded.rows, intrinsic, independent, pivots)
 
     def quantities(self) -> dict[str, Any]:
         return {**super().quantities(), "constraint_force": self.constraint_force}
@@ -281,13 +281,13 @@ def from_matrices(given: GivenMatrices) -> MotionEquations:
         return MotionEquations(given.name, given.formulation, False, given.symbols, recorded.algebra.recorder,
                                recorded.algebra.leaves, quantities.quantities(), given.remarks, again=again)
 
-    def result(quantities: Constrained, otherwise: Equations | None) -> AugmentedEquations:
+    def result(quantities: Constrained, singular_fallback: Equations | None) -> AugmentedEquations:
         return AugmentedEquations(given.name, given.formulation, False, given.symbols, recorded.algebra.recorder,
                                   recorded.algebra.leaves, quantities.quantities(), given.remarks, again=again,
                                   constraints=tuple(r.name for r in recorded.rows),
-                                  holonomic=tuple(r.holonomic for r in recorded.rows), otherwise=otherwise)
+                                  holonomic=tuple(r.holonomic for r in recorded.rows), singular_fallback=singular_fallback)
 
-    whole = result(_ConstrainedMatrices(recorded, kernel=True), None)
+    whole = result(_ConstrainedMatrices(recorded, intrinsic=True), None)
     faults = contradictions(whole)
     if faults:
         raise ModelError(faults, given.name)
@@ -328,9 +328,9 @@ def _compare_accelerations(recorded: Recorded) -> None:
     own = np.array([[*r.jacobian, r.remaining] for r in rows], dtype=object)
     coefficients, rest = given.accelerations
     others = np.column_stack([recorded.taken.matrix(coefficients), recorded.taken.constants(rest)])
-    found = at_random_states(recorded.algebra, recorded.symbols, own=own, others=others)
-    size = np.abs(found["own"]).max(axis=2) + 1e-300
-    wrong = [rows[k].name for k in range(len(rows)) if (np.abs(found["own"] - found["others"])[:, k].max(axis=1)
+    result = at_random_states(recorded.algebra, recorded.symbols, own=own, others=others)
+    size = np.abs(result["own"]).max(axis=2) + 1e-300
+    wrong = [rows[k].name for k in range(len(rows)) if (np.abs(result["own"] - result["others"])[:, k].max(axis=1)
                                                         > ROUNDING * size[:, k]).any()]
     if wrong:
         warnings.warn(f"{given.name}: the acceleration constraints of {', '.join(wrong)} are not the derivatives of the velocity "

@@ -40,12 +40,12 @@ def absolute_start(relative: Model, absolute: Model) -> dict[sp.Symbol, float]:
         poses.append([*(ground_R.T @ arm), *(ground_R.T @ kinematics.rotation(pose)).ravel()])
         twists.append([*(ground_R.T @ (v - ground_v - cross(ground_omega, arm))), *(ground_R.T @ (omega - ground_omega))])
     tape = Tape.of(tree.algebra.recorder, poses=np.array(poses, dtype=object), twists=np.array(twists, dtype=object))
-    found = {name: array[0] for name, array in evaluate_rows(tape, values, 1).items()}
+    result = {name: array[0] for name, array in evaluate_rows(tape, values, 1).items()}
     start: dict[sp.Symbol, float] = {}
     for k, joint in own:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            start |= _of_joint(joint, found["poses"][k], found["twists"][k])
+            start |= _of_joint(joint, result["poses"][k], result["twists"][k])
         if any("imbal" in str(warning.message) for warning in caught):
             angles: Any = getattr(joint, "orientation", None)
             warnings.warn(f"{relative.name}: the Euler angles {angles.sequence} of {absolute.bodies[k].name} are singular at the "

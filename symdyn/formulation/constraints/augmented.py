@@ -43,16 +43,16 @@ COORDINATES = ("relative", "absolute")
 class ConstrainedTree(Constrained, TreeQuantities):
     """A tree whose loops are closed by constraints."""
 
-    def __init__(self, tree: Tree, gathered: Gathered | None = None, kernel: bool = False,
+    def __init__(self, tree: Tree, gathered: Gathered | None = None, intrinsic: bool = False,
                  independent: tuple[int, ...] | None = None, pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         super().__init__(tree)
         self.gathered = gathered or Gathered(tree)
         self.rows = self.gathered.rows
-        self.kernel = kernel
+        self.intrinsic = intrinsic
         self.independent = independent
         self.pivots = pivots
-        self.locking = tree.locking
-        perhaps = [f"{self.speeds[p]}{self.remarks[self.speeds[p]]}" for p in self.locking]
+        self.massless_pivots = tree.massless_pivots
+        perhaps = [f"{self.speeds[p]}{self.remarks[self.speeds[p]]}" for p in self.massless_pivots]
         self.unheld += f"; perhaps {', '.join(perhaps)}" if perhaps else ""
         if self.gathered.trivial:
             self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
@@ -126,8 +126,8 @@ class ConstrainedTree(Constrained, TreeQuantities):
         """Derivatives of the reactions, row by row, by the multipliers at given accelerations, (6 n_joints, n_c)."""
         recorder = self.algebra.recorder
         lam = vector(*[recorder.leaf(f"lam{k + 1}", SEED) for k in range(len(self.rows))])
-        found = self.reactions_of(lam)
-        entries = [e for joint in self.reacting for e in found[joint.name]]
+        result = self.reactions_of(lam)
+        entries = [e for joint in self.reacting for e in result[joint.name]]
         return jacobian(recorder, entries, list(lam), "forward")
 
     def all_reactions(self, whole: bool = False) -> dict[str, np.ndarray]:
@@ -135,7 +135,7 @@ class ConstrainedTree(Constrained, TreeQuantities):
 
     def reactions_of(self, lam: np.ndarray, whole: bool = False) -> dict[str, np.ndarray]:
         """Joint name -> reaction with these multipliers, or whole: cut load."""
-        closed = {place for c in self.gathered.closures for place in c.places}
+        closed = {index for c in self.gathered.closures for index in c.places}
         other = [k for k in range(len(self.rows)) if k not in closed]
         along = -self.C_r()[other].T @ lam[other] if other else None
         return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along,
@@ -193,8 +193,8 @@ def augment(model: Model, coordinates: str = "relative", orientation: Any = None
     gathered = Gathered(tree)
     names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
 
-    def result(quantities: ConstrainedTree, otherwise: Equations | None) -> AugmentedEquations:
-        return tree_result(quantities, "augmented", AugmentedEquations, again, otherwise=otherwise, **names)
+    def result(quantities: ConstrainedTree, singular_fallback: Equations | None) -> AugmentedEquations:
+        return tree_result(quantities, "augmented", AugmentedEquations, again, singular_fallback=singular_fallback, **names)
 
     if gathered.rows:
         faults = contradictions(result(ConstrainedTree(tree, gathered, True), None))

@@ -61,41 +61,41 @@ class ConstraintStates:
         best, least = q.copy(), np.full(len(q), np.inf)
         now, running = q.copy(), np.arange(len(q))
         for k in range(ITERATIONS + 1):
-            found = self.at(now[running])
-            residual = self.residual(found)
+            result = self.at(now[running])
+            residual = self.residual(result)
             size = np.abs(residual).max(axis=1, initial=0.0)
-            defined = np.isfinite(size) & np.isfinite(found.C_r.values).all(axis=1)
+            defined = np.isfinite(size) & np.isfinite(result.C_r.values).all(axis=1)
             better = defined & (size < least[running])
             best[running[better]], least[running[better]] = now[running[better]], size[better]
             on = defined & (size >= FULFILLED)
             if k == ITERATIONS or not on.any():
                 break
             running = running[on]
-            now[running] += self._step(found[on], residual[on])
+            now[running] += self._step(result[on], residual[on])
             self._normalise(now)
         return best, least
 
-    def residual(self, found: AtStates) -> np.ndarray:
+    def residual(self, result: AtStates) -> np.ndarray:
         """C C_scale / length, (s, n_c)."""
-        return found.C * found.C_scale / found.length[:, None]
+        return result.C * result.C_scale / result.length[:, None]
 
     def velocities(self, length: Any) -> np.ndarray:
         """What makes velocities (m/s) of the speeds, (n_u,)."""
         return np.where(self.angular, length, 1.0)
 
-    def moved(self, found: AtStates, y: np.ndarray) -> np.ndarray:
+    def moved(self, result: AtStates, y: np.ndarray) -> np.ndarray:
         """Changes of the coordinates (s, n_q) for directions y (s, n_u) of the speeds as parts of the length."""
-        length = found.length[:, None]
-        return found.N.times(y * length / np.where(self.angular[None, :], length, 1.0))
+        length = result.length[:, None]
+        return result.N.times(y * length / np.where(self.angular[None, :], length, 1.0))
 
-    def scaled(self, found: AtStates) -> Sampled:
+    def scaled(self, result: AtStates) -> Sampled:
         """C_r, lengths by lengths."""
-        return found.C_r.scaled(found.C_scale, np.where(self.angular[None, :], found.length[:, None], 1.0))
+        return result.C_r.scaled(result.C_scale, np.where(self.angular[None, :], result.length[:, None], 1.0))
 
-    def _step(self, found: AtStates, residual: np.ndarray) -> np.ndarray:
-        y = -self.scaled(found).without_rows(~self.holonomic).least_change(residual, CUT)
+    def _step(self, result: AtStates, residual: np.ndarray) -> np.ndarray:
+        y = -self.scaled(result).without_rows(~self.holonomic).least_change(residual, CUT)
         largest = np.abs(y).max(axis=1, initial=0.0)[:, None]
-        return self.moved(found, y / np.maximum(largest, 1.0))  # at most about a radian at once
+        return self.moved(result, y / np.maximum(largest, 1.0))  # at most about a radian at once
 
     def _normalise(self, q: np.ndarray) -> None:
         for places in self.units:

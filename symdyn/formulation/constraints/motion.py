@@ -16,11 +16,11 @@ import numpy as np
 from symdyn.formulation.accelerations import Implicit, Motion
 from symdyn.formulation.constraints.null_space import NullSpaceSolver
 from symdyn.formulation.constraints.rows import Row
-from symdyn.formulation.constraints.saddle import KernelSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
+from symdyn.formulation.constraints.saddle import IntrinsicSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward
-from symdyn.tape.kernels import DAMPED, SMOOTHED
+from symdyn.tape.intrinsics import DAMPED, SMOOTHED
 from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
 
@@ -36,7 +36,7 @@ class Constrained(Motion):
 
     rows          of the constraints; length: the mechanism's, m; lever: what angular speeds are multiplied by to compare them
                   with others, m; angular: for each speed whether it turns (symdyn.turning)
-    kernel        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
+    intrinsic        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows
     pivots        (row, column) of C_r in the order in which dependent speeds are eliminated; None: by the Schur complement
@@ -45,10 +45,10 @@ class Constrained(Motion):
     """
 
     rows: list[Row]
-    kernel = False
+    intrinsic = False
     independent: tuple[int, ...] | None = None
     pivots: tuple[tuple[int, int], ...] | None = None
-    locking: Mapping[int, Collection[int]] = {}
+    massless_pivots: Mapping[int, Collection[int]] = {}
     unheld = "a speed is held neither by mass nor by a constraint"
 
     @cached_property
@@ -120,12 +120,12 @@ class Constrained(Motion):
 
     def corrector(self) -> SaddleSolver:
         """The same for corrections."""
-        return self._solver(DAMPED) if self.kernel else self.recall("saddle")  # type: ignore[no-any-return]
+        return self._solver(DAMPED) if self.intrinsic else self.recall("saddle")  # type: ignore[no-any-return]
 
     def _solver(self, smoothed: float) -> SaddleSolver:
-        if self.kernel:
-            return KernelSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), self.unheld,
-                                smoothed)
+        if self.intrinsic:
+            return IntrinsicSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), self.unheld,
+                                   smoothed)
         kept = list(range(len(self.rows)) if self.independent is None else self.independent)
         C_r, names = self.C_r()[kept], [self.rows[k].name for k in kept]
         if self.pivots is not None:
@@ -133,7 +133,7 @@ class Constrained(Motion):
             mixed = len(set(self.angular)) > 1
             columns = self._columns() if mixed else [1] * len(self.speeds)
             solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds,
-                                                   [self._least(k, mixed) for k in kept], columns, self.locking)
+                                                   [self._least(k, mixed) for k in kept], columns, self.massless_pivots)
         else:
             solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, [self._least(k) for k in kept])
         return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))

@@ -18,7 +18,7 @@ from symdyn.spatial.vectors import congruence, inner, vector, zeros
 from symdyn.tape.node import Node, is_zero
 
 # Below this part of the size of its row, a pair of pivots below its square, a pivot takes too many digits away, from multipliers
-# those of its square: the kernel takes over.
+# those of its square: the intrinsic takes over.
 SMALLEST_PIVOT = Fraction(1, 10)
 # Pivots at the sample state are at least this part of the largest that there is.
 ADMITTED = 0.2
@@ -37,7 +37,7 @@ class NullSpaceSolver:
 
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],
                  speeds: Sequence[Any], least: Sequence[Any] = (), columns: Sequence[Any] = (),
-                 locking: Mapping[int, Collection[int]] | None = None) -> None:
+                 massless_pivots: Mapping[int, Collection[int]] | None = None) -> None:
         self.algebra, self.M, self.C = algebra, M, C
         self.least = least or [0] * len(C)
         self.columns = vector(*(columns or [1] * C.shape[1]))
@@ -55,14 +55,14 @@ class NullSpaceSolver:
             reduced = congruence(M, self.Z)
             algebra.name("Mi", reduced)
             reasons = [f"the mass matrix under the constraints is not positive definite at {speeds[k]}" for k in self.i]
-            sizes = self._sizes(reduced, locking or {})
+            sizes = self._sizes(reduced, massless_pivots or {})
             self.factors = factorize(algebra, reduced, reasons, "i", dict.fromkeys(sizes, algebra.rounding), sizes)
 
-    def _sizes(self, reduced: np.ndarray, locking: Mapping[int, Collection[int]]) -> dict[int, Any]:
+    def _sizes(self, reduced: np.ndarray, massless_pivots: Mapping[int, Collection[int]]) -> dict[int, Any]:
         """What pivots of the reduced mass matrix are compared with: those of the first independent speed of a motion that may
         have no kinetic energy. Where other speeds of it are dependent, the entry that the pivot comes from may vanish itself."""
         sizes: dict[int, Any] = {}
-        for first, others in locking.items():
+        for first, others in massless_pivots.items():
             dependent = any(k in self.d for k in (first, *others))
             for k in (first,) if first in self.i else others:
                 if k in self.i:

@@ -180,8 +180,8 @@ class Gathered:
             if closure.base == GROUND:
                 with self.algebra.section(f"constraints of {closure.joint.kind} {closure.joint.name}"):
                     P, Q = self._ends(seen, closure.joint, (closure.parent.pose, closure.child.pose))
-                    for row, place in zip(closure.rows, closure.places, strict=True):
-                        result[place] = row.remaining(P, Q)
+                    for row, index in zip(closure.rows, closure.places, strict=True):
+                        result[index] = row.remaining(P, Q)
         return result
 
     def _gear(self, gear: Gear) -> None:

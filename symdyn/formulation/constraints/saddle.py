@@ -16,12 +16,12 @@ from symdyn.errors import ModelError
 from symdyn.formulation.constraints.sampled import minimum_degree
 from symdyn.formulation.trees.mass_matrix import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
-from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
+from symdyn.tape.intrinsics import SMOOTHED, Multipliers, Saddle
 from symdyn.tape.node import PARAMETER, Node, is_zero
 from symdyn.tape.recorder import Recorder
 
 # A pivot of the Schur complement below this part of its diagonal entry leaves too few digits: a constraint nearly depends
-# on the others, and the kernel takes over. The digits lost are those of this number.
+# on the others, and the intrinsic takes over. The digits lost are those of this number.
 SMALLEST_PIVOT = 1e-6
 # Bytes on the stack that a numeric algorithm may take; threads have 8 MB on most machines.
 MOST_ON_STACK = 6_000_000
@@ -71,9 +71,9 @@ class RangeSolver:
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         inwards = self.factors.inwards(f)
         right = vector(*[inner(self.Z[:, k], inwards) - d[k] for k in range(len(d))])
-        found = self.S.solve(right[self.order])
+        result = self.S.solve(right[self.order])
         lam = zeros(len(d))
-        lam[self.order] = found
+        lam[self.order] = result
         return self.factors.outwards(inwards - (self.Y @ lam if len(lam) else zeros(len(f)))), lam
 
 
@@ -83,15 +83,15 @@ def _square(Y: np.ndarray, Z: np.ndarray) -> np.ndarray:
     S = zeros(m, m)
     for k, row in enumerate(Y):
         there = [j for j, e in enumerate(row) if not is_zero(e)]
-        for place, i in enumerate(there):
-            for j in there[:place + 1]:
+        for index, i in enumerate(there):
+            for j in there[:index + 1]:
                 S[i, j] = S[i, j] + Y[k, i] * Z[k, j]
     for i in range(m):
         S[:i, i] = S[i, :i]
     return S
 
 
-class KernelSolver:
+class IntrinsicSolver:
     """By numeric algorithms that take a singular M and dependent rows; lam is the solution of least norm after scaling.
 
     rows, columns   scales (m,) and (n,) of C that make its entries lengths by lengths
@@ -118,13 +118,13 @@ class KernelSolver:
 
 def least_multipliers(recorder: Recorder, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], right: np.ndarray,
                       reason: str) -> np.ndarray:
-    """lam (m,) of C^T lam = right, of least norm after scaling; scales as for KernelSolver. Raises ModelError for too many."""
+    """lam (m,) of C^T lam = right, of least norm after scaling; scales as for IntrinsicSolver. Raises ModelError for too many."""
     too_large = no_room(C.shape[1], len(C))
     if too_large:
         raise ModelError([f"multipliers of least norm are requested, since constraints depend on others, and {too_large}; leave "
                           "out constraints that follow from others"])
-    kernel = Multipliers((C.shape[1], len(C)), reason)
-    return vector(*recorder.call(kernel, [*C.ravel(), *rows, *columns, *right]))
+    intrinsic = Multipliers((C.shape[1], len(C)), reason)
+    return vector(*recorder.call(intrinsic, [*C.ravel(), *rows, *columns, *right]))
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,9 @@ class SubsetSolver:
     n: int
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        x, found = self.solver.solve(f, d[self.kept])
+        x, result = self.solver.solve(f, d[self.kept])
         lam = zeros(self.n)
-        lam[self.kept] = found
+        lam[self.kept] = result
         return x, lam
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -169,10 +169,10 @@ class Sampled:
         if not self.sparse:
             return np.linalg.svd(self.dense())[0][:, :, rank:]
         factors = self.triangular()
-        found = np.linalg.qr(factors.combinations(self.m - rank))[0]
+        result = np.linalg.qr(factors.combinations(self.m - rank))[0]
         for k in np.flatnonzero(factors.kept.sum(axis=1) != rank):
-            found[k] = np.linalg.svd(self[[k]].dense())[0][0, :, rank:]
-        return found
+            result[k] = np.linalg.svd(self[[k]].dense())[0][0, :, rank:]
+        return result
 
     def triangular(self) -> Triangular:
         """R of A^T = Q R."""
@@ -213,7 +213,7 @@ def _first(n: int) -> np.ndarray:
 
 def _largest(A: Sampled) -> np.ndarray:
     """The largest singular value, (s,), by power iteration."""
-    found = np.zeros(len(A))
+    result = np.zeros(len(A))
     start = np.random.default_rng(5).standard_normal(A.m)
     for k, matrix in enumerate(A.matrices):
         x = start / np.linalg.norm(start)
@@ -223,8 +223,8 @@ def _largest(A: Sampled) -> np.ndarray:
             if size == 0:
                 break
             x /= size
-        found[k] = np.sqrt(size)
-    return np.maximum(found, 1e-300)
+        result[k] = np.sqrt(size)
+    return np.maximum(result, 1e-300)
 
 
 def elimination(A: Sampled) -> np.ndarray:
@@ -301,11 +301,11 @@ class Triangular:
 
     def combinations(self, count: int) -> np.ndarray:
         """Of each row of A that was not kept, itself less what it is of those that were, (s, m, count)."""
-        found = np.zeros((len(self.kept), len(self.R), count))
+        result = np.zeros((len(self.kept), len(self.R), count))
         for k, kept in enumerate(self.kept):
             own, others = np.flatnonzero(kept), np.flatnonzero(~kept)[:count]
             R = self._matrix(k)
             parts = self._solver(R[own][:, own]).solve(R[own][:, others].toarray())
-            found[k][np.ix_(self.order[own], np.arange(len(others)))] = -parts
-            found[k, self.order[others], range(len(others))] = 1
-        return found
+            result[k][np.ix_(self.order[own], np.arange(len(others)))] = -parts
+            result[k, self.order[others], range(len(others))] = 1
+        return result

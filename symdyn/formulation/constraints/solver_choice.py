@@ -18,7 +18,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.dependent_rows import Ranks
 from symdyn.formulation.probes.rank import first_dependent
-from symdyn.tape.kernels import MASSLESS
+from symdyn.tape.intrinsics import MASSLESS
 from symdyn.tape.node import is_zero
 from symdyn.tape.tape import Tape
 
@@ -37,7 +37,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     """The equations with the cheapest accelerations that hold at every state; where the numeric algorithm is too large, at those
     where no pivot vanishes, which raise there.
 
-    derivation   (kernel, independent, pivots) -> quantities, all on one tape; see Constrained
+    derivation   (intrinsic, independent, pivots) -> quantities, all on one tape; see Constrained
     result       (quantities, the same for states where these fail) -> equations
     search       finds which rows depend on the others; None: unknown
     Raises ModelError for a singular mass matrix where neither statements nor the numeric algorithm solve.
@@ -86,12 +86,12 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     return replace(chosen, notes=(*chosen.notes, *notes))
 
 
-def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None) -> list[str]:
+def _remarks(equations: Equations, quantities: Constrained, result: Ranks | None) -> list[str]:
     """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
     symbols = equations.symbols
     used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
     lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
-    if found is None:
+    if result is None:
         if not lacking:
             given = getattr(quantities, "prescribed", ())
             drives = f"; the motion of {', '.join(given)} in the loops is prescribed and may leave none" if given else ""
@@ -101,15 +101,15 @@ def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None)
             return []
         return [f"constraints: whether they depend on each other is unknown, because {', '.join(lacking)} "
                 f"{'has no number' if len(lacking) == 1 else 'have no numbers'} in defaults"]
-    if found.vanishing:
-        rows = ", ".join(equations.constraints[k] for k in found.vanishing)
+    if result.vanishing:
+        rows = ", ".join(equations.constraints[k] for k in result.vanishing)
         warnings.warn(f"{equations.name}: all derivatives of {rows} vanish at every consistent state found, so that it holds "
                       "nothing there; pass a constraint that changes its sign where it is fulfilled, for a square its root",
                       ModelWarning, stacklevel=5)
-    if found.rank < len(symbols.speeds):
+    if result.rank < len(symbols.speeds):
         return []
     if not lacking and all(is_zero(e) for e in quantities.C_t()):  # with random numbers it may be theirs
-        warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {found.rank}, as many as there are "
+        warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {result.rank}, as many as there are "
                       "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=5)
     return ["motion: the constraints determine every speed, so that the forces do not change the motion"]
 
@@ -125,17 +125,17 @@ def singular(quantities: Constrained) -> bool:
     return any(is_zero(M[k, k]) for k in range(len(M))) or first_dependent(quantities.algebra.recorder, M) is not None
 
 
-def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) -> tuple[Pivots | None, int]:
+def _pivots(quantities: Constrained, result: Ranks | None, fewest: int | None) -> tuple[Pivots | None, int]:
     """Dependent speeds and their order, where the sample state allows it; none, and how many operations it takes at least,
     where these are many more than the fewest of other ways."""
-    if found is None or not found.independent:
+    if result is None or not result.independent:
         return None, 0
-    kept = list(found.independent)
+    kept = list(result.independent)
     C_r = quantities.C_r()[kept]
     structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
-    if not _holds(found, kept):
+    if not _holds(result, kept):
         return None, 0
-    samples = found.samples.of_rows(kept)
+    samples = result.samples.of_rows(kept)
     orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)].dense()
               if (order := elimination_order(A, structure)) is not None}
     if not orders:
@@ -156,10 +156,10 @@ def _pivots(quantities: Constrained, found: Ranks | None, fewest: int | None) ->
     return tuple((kept[row], column) for row, column in best), 0
 
 
-def _holds(found: Ranks, kept: list[int]) -> bool:
+def _holds(result: Ranks, kept: list[int]) -> bool:
     """Whether there is mass in every direction that the constraints leave; there is where every direction has mass."""
-    least = MASSLESS * max(np.abs(found.mass).max(), 1e-300)
-    if np.linalg.eigvalsh(found.mass)[0] > least:
+    least = MASSLESS * max(np.abs(result.mass).max(), 1e-300)
+    if np.linalg.eigvalsh(result.mass)[0] > least:
         return True
-    free = np.linalg.svd(found.samples[[0]].of_rows(kept).dense()[0])[2][len(kept):].T
-    return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ found.mass @ free)[0] > least)
+    free = np.linalg.svd(result.samples[[0]].of_rows(kept).dense()[0])[2][len(kept):].T
+    return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ result.mass @ free)[0] > least)

@@ -63,16 +63,16 @@ def base(tree: Tree, speed_rates: np.ndarray, a_0: np.ndarray) -> Base:
     felt = [k for k in range(len(values)) if not is_zero(values[k]) and not all(map(is_zero, Y[:, k]))]
     values, names, Y = [values[k] for k in felt], [names[k] for k in felt], Y[:, felt]
     sample, parameters = _sampled(tree, Y)
-    found = independent(sample, names)
-    for column, numbers in found.coefficients.items():
+    result = independent(sample, names)
+    for column, numbers in result.coefficients.items():
         with tree.algebra.section(f"base parameters: {names[column]} regrouped"):
             others = list(numbers)
             exact = factors(tree.algebra.recorder, Y[:, others], Y[:, column], parameters, _unit_groups(tree))
             _demand_agreement(tree, exact, list(numbers.values()), parameters, names[column])
             for k, factor in zip(others, exact, strict=True):
                 values[k] = values[k] + factor * values[column]
-    kept = list(found.kept)
-    return Base(tuple(names[k] for k in kept), vector(*[values[k] for k in kept]), Y[:, kept], found.margins)
+    kept = list(result.kept)
+    return Base(tuple(names[k] for k in kept), vector(*[values[k] for k in kept]), Y[:, kept], result.margins)
 
 
 def _sampled(tree: Tree, Y: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
@@ -97,10 +97,10 @@ def _sampled(tree: Tree, Y: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
 
 def _demand_agreement(tree: Tree, exact: list[Any], wanted: list[float], parameters: Mapping[str, float],
                       name: str) -> None:
-    found = evaluate_rows(Tape.of(tree.algebra.recorder, factors=vector(*exact)), parameters, 1)["factors"][0]
-    if not np.allclose(found, wanted, rtol=_AGREEMENT, atol=_AGREEMENT):
+    result = evaluate_rows(Tape.of(tree.algebra.recorder, factors=vector(*exact)), parameters, 1)["factors"][0]
+    if not np.allclose(result, wanted, rtol=_AGREEMENT, atol=_AGREEMENT):
         raise SymdynError(f"{tree.model.name}: {name} follows from other parameters with the factors {wanted}, but expressions "
-                          f"for them give {found.tolist()}; describe the joints by plain coordinates")
+                          f"for them give {result.tolist()}; describe the joints by plain coordinates")
 
 
 def _unit_groups(tree: Tree) -> list[list[str]]:

@@ -48,9 +48,9 @@ class Identification:
     @cached_property
     def base(self) -> Base:
         """The base parameters and their regressor."""
-        found = base(self.tree, self.speed_rates, self._upwards())
-        self.tree.algebra.name("Yb", found.Y)
-        return found
+        result = base(self.tree, self.speed_rates, self._upwards())
+        self.tree.algebra.name("Yb", result.Y)
+        return result
 
     def _upwards(self) -> np.ndarray:
         """Acceleration of the base that stands for gravity, n-frame."""
@@ -131,5 +131,5 @@ def base_parameters(equations: Equations) -> BaseParameters:
     if equations.identification is None:
         raise SymdynError(f"{equations.name} ({equations.formulation}) has no bodies, so no inertial parameters; describe it by "
                           "bodies and joints (sd.System)")
-    found = equations.identification.base
-    return BaseParameters(equations, found.names, found.margins)
+    result = equations.identification.base
+    return BaseParameters(equations, result.names, result.margins)

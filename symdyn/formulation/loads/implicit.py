@@ -29,7 +29,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.formulation.algebra import TapeAlgebra
-from symdyn.model.elements import Watch
+from symdyn.model.elements import Validity
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import jacobian
@@ -61,7 +61,7 @@ class Settled:
     it."""
 
     values: Mapping[sp.Expr, Any]
-    watch: Watch
+    validity: Validity
 
 
 def solve(algebra: TapeAlgebra, name: str, leaves: Mapping[sp.Expr, Node], measured: Callable[[Quantity], Any]) -> Settled:
@@ -104,7 +104,7 @@ class _Implicit:
     def settled(self) -> Settled:
         r = self._piecewise_linear() if all(self._linear(phi) for phi, _ in self.branches) else self._newton()
         at = self.algebra.within(dict(zip(self.unknowns, self.algebra.name("implicit", r), strict=True)))
-        return Settled({e: at.expression(e) for e in self.loads}, Watch(
+        return Settled({e: at.expression(e) for e in self.loads}, Validity(
             "loads that depend on reactions", self.margin, LEAST_MARGIN, math.inf,
             f"the loads that depend on {self.listed} come close to having no solution or more than one, where the mechanism "
             "jams: the determinant of their equations, 1 without them, is {value}"))
@@ -211,9 +211,10 @@ def _continuous(load: sp.Expr, unknowns: set[Quantity], name: str) -> sp.Expr:
             first = (first + other + sp.Abs(first - other, evaluate=False)) / 2
         return first
 
-    found: sp.Expr = load.replace(lambda e: isinstance(e, sp.Max) and bool(unknowns & e.free_symbols), lambda e: largest(*e.args))
-    return found.replace(lambda e: isinstance(e, sp.Min) and bool(unknowns & e.free_symbols),
-                         lambda e: -largest(*[-a for a in e.args]))
+    result: sp.Expr = load.replace(lambda e: isinstance(e, sp.Max) and bool(unknowns & e.free_symbols),
+                                   lambda e: largest(*e.args))
+    return result.replace(lambda e: isinstance(e, sp.Min) and bool(unknowns & e.free_symbols),
+                          lambda e: -largest(*[-a for a in e.args]))
 
 
 def _jumps(e: sp.Basic, unknowns: set[Quantity]) -> bool:
@@ -223,15 +224,15 @@ def _jumps(e: sp.Basic, unknowns: set[Quantity]) -> bool:
 
 def _absolute_values(loads: Sequence[sp.Expr], unknowns: set[Quantity]) -> list[sp.Abs]:
     """Absolute values of what depends on unknowns, inner ones first."""
-    found = {e for load in loads for e in load.atoms(sp.Abs) if unknowns & e.free_symbols}
-    return sorted(found, key=lambda e: (len(e.atoms(sp.Abs)), sp.default_sort_key(e)))
+    result = {e for load in loads for e in load.atoms(sp.Abs) if unknowns & e.free_symbols}
+    return sorted(result, key=lambda e: (len(e.atoms(sp.Abs)), sp.default_sort_key(e)))
 
 
 def _smooth_roots(load: sp.Expr, unknowns: set[Quantity]) -> sp.Expr:
     """Roots of what depends on unknowns, with a derivative of zero where that is zero: of a sum of squares at rest."""
-    found: sp.Expr = load.replace(lambda e: isinstance(e, sp.Pow) and e.exp == sp.S.Half and bool(unknowns & e.free_symbols),
-                                  lambda e: sp.sqrt(sp.Max(e.base, LEAST_SQUARE)))
-    return found
+    result: sp.Expr = load.replace(lambda e: isinstance(e, sp.Pow) and e.exp == sp.S.Half and bool(unknowns & e.free_symbols),
+                                   lambda e: sp.sqrt(sp.Max(e.base, LEAST_SQUARE)))
+    return result
 
 
 def _determinant(A: np.ndarray) -> Any:

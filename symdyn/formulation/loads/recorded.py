@@ -18,7 +18,7 @@ from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.kinematics import Kinematics
 from symdyn.formulation.trees.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
-from symdyn.model.elements import Action, Element, Watch
+from symdyn.model.elements import Action, Element, Validity
 from symdyn.model.joints.modal import exactly
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
 from symdyn.model.quantity import Quantity, quantities_in
@@ -127,27 +127,28 @@ class Loads:
                     total = total + self.algebra.expression(load.stiffness) * (stretch * stretch) / 2
         return total
 
-    def watches(self) -> list[Watch]:
+    def watches(self) -> list[Validity]:
         """What elements want to be looked at, and how far elastic bodies bend."""
-        found = [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
-        found += [self._bending(body) for body in self.tree.flexible]
-        found += [Watch(f"depth of contact {c.name}", -self.algebra.expression(c.gap), -math.inf, c.depth,
-                        f"contact {c.name}: it goes {{value}} m deep, its compliance is meant for {c.depth:g} m; a larger "
-                        "stiffness keeps it shallower") for c in self.model.compliant if c.depth is not None]
-        found += [Watch(f"creep of contact {c.name}", self.algebra.expression(c.held_slip), -math.inf, c.creep,
-                        f"contact {c.name}: it creeps {{value}} m while friction holds, its compliance is meant for {c.creep:g} "
-                        "m; a smaller slip_speed makes it creep less, and bristles with an elastic part do not creep", True)
-                  for c in self.model.compliant if c.creep is not None]
-        return [*found, self.settled.watch] if self.implicit else found
+        result = [validity for load in self.model.loads if isinstance(load, Element) for validity in self._action(load).watches]
+        result += [self._bending(body) for body in self.tree.flexible]
+        result += [Validity(f"depth of contact {c.name}", -self.algebra.expression(c.gap), -math.inf, c.depth,
+                            f"contact {c.name}: it goes {{value}} m deep, its compliance is meant for {c.depth:g} m; a larger "
+                            "stiffness keeps it shallower") for c in self.model.compliant if c.depth is not None]
+        result += [Validity(f"creep of contact {c.name}", self.algebra.expression(c.held_slip), -math.inf, c.creep,
+                            f"contact {c.name}: it creeps {{value}} m while friction holds, its compliance is meant for "
+                            f"{c.creep:g} m; a smaller slip_speed makes it creep less, and bristles with an elastic part do "
+                            "not creep", True)
+                   for c in self.model.compliant if c.creep is not None]
+        return [*result, self.settled.validity] if self.implicit else result
 
-    def _bending(self, body: FlexibleLink) -> Watch:
+    def _bending(self, body: FlexibleLink) -> Validity:
         name = self.tree.links[body.link].joint.name
         with self.algebra.section(f"joint {name}: deflection"):
             away = exactly(body.beam.Psi_tip) @ body.eta / exact(body.beam.length)
             part = self.algebra.sqrt(dot(away, away))
-        return Watch(f"deflection of {name}", part, -math.inf, FAR,
-                     f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to "
-                     f"second order, which is meant for deflections below {FAR:g}")
+        return Validity(f"deflection of {name}", part, -math.inf, FAR,
+                        f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to "
+                        f"second order, which is meant for deflections below {FAR:g}")
 
     # -- values
 
@@ -224,8 +225,8 @@ class Loads:
 
     def _joint(self, result: Applied, load: JointForce) -> None:
         link = self.tree.moved_by.get(load.joint)
-        for place, value in zip(link.speeds, load.values, strict=True) if link is not None else ():
-            result.joint[place] = result.joint[place] + self.value(value)
+        for index, value in zip(link.speeds, load.values, strict=True) if link is not None else ():
+            result.joint[index] = result.joint[index] + self.value(value)
 
     def _spring(self, result: Applied, load: SpringDamper, elastic: bool, damped: bool) -> None:
         springs = elastic if load.is_elastic(self.model.parameters) else damped  # with other loads, where it has no potential

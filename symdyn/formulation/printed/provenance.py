@@ -109,7 +109,7 @@ def explain(equations: MotionEquations, quantity: str, *index: int, simplify: bo
                           f"{', '.join(map(shown, index))}")
     source: Provenance = equations.provenance
     parts = source.mass(*index) if quantity == "M_tilde" else source.velocity(*index)
-    found = []
+    result = []
     for body, motion, kind, node in parts:
         if is_zero(node):
             continue
@@ -119,8 +119,8 @@ def explain(equations: MotionEquations, quantity: str, *index: int, simplify: bo
 
             value = simplified(value, equations.simplify_seconds)
         if value != 0:
-            found.append(Contribution(body, motion, kind, value))
-    return Explanation(quantity, tuple(int(i) for i in index), tuple(found))
+            result.append(Contribution(body, motion, kind, value))
+    return Explanation(quantity, tuple(int(i) for i in index), tuple(result))
 
 
 Part = tuple[str, str, str, Any]

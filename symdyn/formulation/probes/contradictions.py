@@ -62,11 +62,11 @@ def contradictions(equations: Equations) -> list[str]:
     first, *others = [_conflicts(d, kept, equations.holonomic) for d in draws]
     for conflict in first:
         listed = ", ".join(names[j] for j in conflict.others)
-        if all(any(_same(conflict, c) for c in found) for found in others):
+        if all(any(_same(conflict, c) for c in result) for result in others):
             faults.append(f"{names[conflict.k]} contradicts {listed}: together they demand {conflict.defect:.6g} = 0 of the "
                           f"{conflict.of}{'' if free or not symbols.parameters else ' with the numbers in defaults'}; remove or "
                           "correct one of them")
-        elif all(any(_alike(conflict, c) for c in found) for found in others):
+        elif all(any(_alike(conflict, c) for c in result) for result in others):
             matter = _parameters_in(equations, conflict, numbers, free, kept)
             given = ", ".join(p.name for p in matter)
             if _always(equations, conflict, numbers, free, matter, kept):
@@ -78,10 +78,10 @@ def contradictions(equations: Equations) -> list[str]:
                               "numbers in defaults, or remove one of the constraints", ModelWarning, stacklevel=5)
     loose = [_loose(d) for d in draws]
     if all(entries is not None for entries in loose):
-        found = sorted(set.intersection(*[entries for entries in loose if entries is not None]))
-        if found:
-            faults.append(f"{', '.join(symbols.speeds[j].name for j in found)}: neither mass nor a constraint holds "
-                          f"{'this speed' if len(found) == 1 else 'a motion of these speeds'}; give it mass, a constraint, or "
+        result = sorted(set.intersection(*[entries for entries in loose if entries is not None]))
+        if result:
+            faults.append(f"{', '.join(symbols.speeds[j].name for j in result)}: neither mass nor a constraint holds "
+                          f"{'this speed' if len(result) == 1 else 'a motion of these speeds'}; give it mass, a constraint, or "
                           "leave out the coordinate")
     return faults
 
@@ -99,8 +99,8 @@ def _draw(equations: Equations, numbers: Mapping[str, float]) -> _Draw | None:
     for group in (symbols.coordinates, symbols.speeds, symbols.states):
         values |= {s.name: stream.uniform(0.5, 1.5, STATES) for s in group}
     values |= {s.name: stream.uniform(0.5, 1.5) for s in symbols.inputs}  # motions are given, as time is
-    found = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
-    arrays = [found[name] for name in ("C", "C_r", "C_t", "M_tilde")]
+    result = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
+    arrays = [result[name] for name in ("C", "C_r", "C_t", "M_tilde")]
     defined = np.all([np.isfinite(a.reshape(STATES, -1)).all(axis=1) for a in arrays], axis=0)
     return _Draw(*[a[defined] for a in arrays]) if defined.sum() > STATES // 2 else None
 
@@ -114,7 +114,7 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
         if np.linalg.eigvalsh(directions @ directions.T)[0] > 1e-9:  # no row depends on the others
             return []
     independent: list[int] = []
-    found = []
+    result = []
     for k in order:
         gradient = gradients[k]
         if not independent:
@@ -135,9 +135,9 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
             defect = values[:, k] - sum(f * values[:, j] for j, f in used)
             size = max(np.abs(f * values[:, j]).max() for j, f in [(k, 1.0), *used])
             if np.abs(defect).min() > TOLERANCE * size and np.ptp(defect) <= TOLERANCE * size:
-                found.append(_Conflict(k, others, float(defect[0]), of))
+                result.append(_Conflict(k, others, float(defect[0]), of))
                 break
-    return found
+    return result
 
 
 def _alike(a: _Conflict, b: _Conflict) -> bool:
@@ -148,8 +148,8 @@ def _alike(a: _Conflict, b: _Conflict) -> bool:
 def _defect(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], kept: Sequence[int]) -> float:
     """That of the same rows with other numbers of the parameters; 0 where they do not contradict each other."""
     draw = _draw(equations, numbers)
-    found = _conflicts(draw, kept, equations.holonomic) if draw is not None else []
-    return next((c.defect for c in found if _alike(conflict, c)), 0.0)
+    result = _conflicts(draw, kept, equations.holonomic) if draw is not None else []
+    return next((c.defect for c in result if _alike(conflict, c)), 0.0)
 
 
 def _parameters_in(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], free: Sequence[str],

@@ -12,7 +12,7 @@ from symdyn.formulation.constraints.consistent_states import FULFILLED, Constrai
 from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
 from symdyn.tape.floats import evaluate_entries
-from symdyn.tape.kernels import RANK
+from symdyn.tape.intrinsics import RANK
 
 # Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
 WALKS, STEPS, STRIDE = 6, 12, 0.25
@@ -59,9 +59,9 @@ def search(equations: Equations, tries: int = TRIES) -> Ranks | None:
             initial[group[0]] = 1.0
     for _ in range(tries):
         numbers = {**symbols.defaults, **{p: float(stream.uniform(0.5, 1.5)) for p in missing}}
-        found = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=initial)))
-        if found is not None:
-            return found
+        result = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=initial)))
+        if result is not None:
+            return result
     return None
 
 
@@ -103,9 +103,9 @@ def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) ->
 def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
     """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those next to them."""
     here = states.at(places).C_r.largest_of_rows().max(axis=0, initial=0.0)
-    beside = states.at(places + stream.uniform(-0.5, 0.5, places.shape)).C_r.largest_of_rows()
-    beside = np.where(np.isfinite(beside), beside, 0.0).max(axis=0, initial=0.0)
-    return tuple(int(k) for k in np.flatnonzero(states.holonomic & (here <= VANISHING * beside)))
+    nearby = states.at(places + stream.uniform(-0.5, 0.5, places.shape)).C_r.largest_of_rows()
+    nearby = np.where(np.isfinite(nearby), nearby, 0.0).max(axis=0, initial=0.0)
+    return tuple(int(k) for k in np.flatnonzero(states.holonomic & (here <= VANISHING * nearby)))
 
 
 def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator) -> Iterator[np.ndarray]:
@@ -115,13 +115,13 @@ def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator)
     direction = stream.normal(size=(WALKS, n_u))
     direction[1::2] = -direction[::2]
     for _ in range(STEPS):
-        found = states.at(now)
-        onward = _along(states.scaled(found), direction)
+        result = states.at(now)
+        onward = _along(states.scaled(result), direction)
         size = np.linalg.norm(onward, axis=1, keepdims=True)
         if not (size > 1e-6).any():
             return
         direction = onward / np.maximum(size, 1e-6)
-        now, residual = states.nearest(now + states.moved(found, STRIDE * direction))
+        now, residual = states.nearest(now + states.moved(result, STRIDE * direction))
         kept = residual < FULFILLED
         if not kept.any():
             return

@@ -37,14 +37,14 @@ POSITIONS, ALIKE, ZERO = 3, 1e-9, 1e-11
 DIGITS, NOTHING = 40, 1e-50
 
 
-def lockable(tree: Tree, solid: bool = False) -> dict[int, frozenset[int]]:
+def vanishing_pivots(tree: Tree, solid: bool = False) -> dict[int, frozenset[int]]:
     """Places of the generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds
     after it that may then move what it moves.
 
     solid   only those that then move no link that has a mass at all, and so no constraint between such links; else links have
             mass in some directions only where they are points or thin rods
     """
-    return _Search(tree, solid).lockable()
+    return _Search(tree, solid).vanishing_pivots()
 
 
 def massless(tree: Tree, k: int) -> bool:
@@ -112,7 +112,7 @@ class _Search:
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
         self.positions = [_Position(tree, k, solid, self.own, self.alive) for k in range(POSITIONS)]
 
-    def lockable(self) -> dict[int, frozenset[int]]:
+    def vanishing_pivots(self) -> dict[int, frozenset[int]]:
         sound: set[int] = set()
         changing: dict[int, frozenset[int]] = {}
         explained: dict[int, frozenset[int]] = {}
@@ -122,12 +122,12 @@ class _Search:
             asked = [p for p in speeds if p not in decided]
             if massless(self.tree, k) or not asked:
                 continue
-            found = {p: self._sound(k, p, [c for c in speeds if c > p]) for p in asked}
-            sound.update(p for p in asked if found[p])
+            result = {p: self._sound(k, p, [c for c in speeds if c > p]) for p in asked}
+            sound.update(p for p in asked if result[p])
             after = {p: frozenset(c for c in speeds if c > p) for p in asked}
-            changing.update({p: after[p] for p in asked if found[p] is False})
-            explained.update({p: after[p] for p in asked if found[p] is None and after[p]})
-            if len(asked) == len(speeds) and all(found.values()):
+            changing.update({p: after[p] for p in asked if result[p] is False})
+            explained.update({p: after[p] for p in asked if result[p] is None and after[p]})
+            if len(asked) == len(speeds) and all(result.values()):
                 self.alive.difference_update(speeds)
             decided |= sound
             # A link that has mass in all directions, and is not moved, moves nothing that hangs on it, either.
@@ -188,13 +188,13 @@ class _Position:
             link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
             own = sorted(frozenset().union(*self.own[k]))
             R, r, S, D = self.floats(link.R, link.r, link.S, D[:, own])
-            found = dict(zip(own, (S @ D).T, strict=True))
+            result = dict(zip(own, (S @ D).T, strict=True))
             before = self.twists(link.parent) if link.parent >= 0 else {}
             for c in self.alive & before.keys():
                 *omega, x, y, z = before[c]
                 carried = np.concatenate([R.T @ omega, R.T @ (np.array([x, y, z]) + np.cross(omega, r))])
-                found[c] = found.get(c, 0) + carried
-            self._twists[k] = found
+                result[c] = result.get(c, 0) + carried
+            self._twists[k] = result
         return self._twists[k]
 
     def directions(self, k: int) -> np.ndarray:
@@ -226,8 +226,8 @@ class _Position:
 
     def floats(self, *arrays: np.ndarray) -> list[np.ndarray]:
         """The same, rounded to doubles; NaN for what is no real number."""
-        found = evaluate_quickly(self._tape(arrays), self.values, DIGITS)
-        return [array.astype(float) for array in found.values()]
+        result = evaluate_quickly(self._tape(arrays), self.values, DIGITS)
+        return [array.astype(float) for array in result.values()]
 
     def _tape(self, arrays: Sequence[np.ndarray]) -> Tape:
         """A tape of arrays; its leaves get values."""
@@ -243,8 +243,8 @@ class _Position:
 
 def _floats(values: np.ndarray) -> np.ndarray:
     """NaN for what is no real number."""
-    found = [float(e) if isinstance(e, int) or hasattr(e, "_mpf_") else math.nan for e in values.ravel()]
-    return np.array(found).reshape(values.shape)
+    result = [float(e) if isinstance(e, int) or hasattr(e, "_mpf_") else math.nan for e in values.ravel()]
+    return np.array(result).reshape(values.shape)
 
 
 def _independent(rows: np.ndarray) -> np.ndarray:

@@ -84,7 +84,7 @@ def forward_dynamics(tree: Tree, tau: Vector, wrenches: Sequence[Wrench] | None 
             u[i] = tau_i - S[i].T @ (I_A[i] @ c[i] + p_A[i])
             named(tree, i, U=U[i], u=u[i])
             reasons = [f"joint {link.joint.name} moves no inertia along {tree.model.speeds[j]}" for j in own[i]]
-            least = {k: tree.algebra.rounding for k, j in enumerate(own[i]) if j in tree.lockable}
+            least = {k: tree.algebra.rounding for k, j in enumerate(own[i]) if j in tree.vanishing_pivots}
             sizes = {k: behind(tree, i, S[i][:, k], lambda child: (I_A[child][:3, :3], I_A[child][3:, 3:]))
                      for k in least if not felt(tree, i, S[i][:, k])}
             factors[i] = factorize(tree.algebra, D[i], reasons, least=least, sizes=sizes)

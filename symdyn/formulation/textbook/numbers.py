@@ -62,9 +62,9 @@ class NumericTree:
                               "do not have; use the equations"], model.name)
         self.applied = loads.applied()
         self.rates = apparent_rates(self.tree)
-        found: dict[Any, None] = {}
-        on_scalars(self._records, found.setdefault)
-        entries = [e for e in found if isinstance(e, Node)]
+        result: dict[Any, None] = {}
+        on_scalars(self._records, result.setdefault)
+        entries = [e for e in result if isinstance(e, Node)]
         self.checks = [(node, recorder.checks[node]) for node in reachable(entries) if node in recorder.checks]
         self.nodes = [*entries, *[node for node, _ in self.checks]]
         self._doubles = Doubles(self.nodes)
@@ -111,14 +111,14 @@ class NumericTree:
         """What takes these nodes, and exact numbers, to numbers."""
         convert: Callable[[Any], Any] = float
         if digits is None:
-            found = doubles.at(values)
+            result = doubles.at(values)
         else:
             with mpmath.workdps(digits + 5):
                 values = {name: _big(v) for name, v in values.items()}
             results = evaluate(Tape.of(self.algebra.recorder, nodes=vector(*nodes), one=1), values, digits)
-            found, one = list(results["nodes"]), results["one"][()]
+            result, one = list(results["nodes"]), results["one"][()]
             convert = lambda e: one * e.numerator / e.denominator
-        known = dict(zip(nodes, found, strict=True))
+        known = dict(zip(nodes, result, strict=True))
         return lambda e: known[e] if isinstance(e, Node) else e if isinstance(e, int) else convert(Fraction(e))
 
 

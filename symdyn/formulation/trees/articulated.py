@@ -55,7 +55,7 @@ class Articulated:
     pivots    (index, pivot) of these speeds
     """
 
-    def __init__(self, tree: Tree, reasons: Mapping[int, str], lockable: Container[int] = ()) -> None:
+    def __init__(self, tree: Tree, reasons: Mapping[int, str], vanishing_pivots: Container[int] = ()) -> None:
         self.tree = tree
         self.pivots: list[tuple[int, Any]] = []
         algebra, links = tree.algebra, tree.links
@@ -66,11 +66,11 @@ class Articulated:
             with algebra.section(f"link {link.name}: articulated inertia"):
                 indices = tuple(index for index in link.speeds if index in reasons)
                 S = link.S[:, [index - link.speeds.start for index in indices]]
-                locking = [column for column, index in enumerate(indices) if index in lockable]
+                massless_pivots = [column for column, index in enumerate(indices) if index in vanishing_pivots]
                 factorized = partial(factorize, algebra, reasons=[reasons[p] for p in indices],
-                                     least=dict.fromkeys(locking, algebra.rounding),
+                                     least=dict.fromkeys(massless_pivots, algebra.rounding),
                                      sizes={c: behind(tree, k, S[:, c], lambda child: (IA[child].A, IA[child].M))
-                                            for c in locking if not felt(tree, k, S[:, c])})
+                                            for c in massless_pivots if not felt(tree, k, S[:, c])})
                 joint = self.released[k] = _release(algebra, k + 1, IA[k], link, indices, S, factorized, tree.elastic(k))
                 self.pivots += zip(indices, joint.D.D, strict=True)
                 if link.parent == GROUND or any(is_zero(pivot) for pivot in joint.D.D):

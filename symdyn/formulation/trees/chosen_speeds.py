@@ -57,8 +57,8 @@ def _own_speeds(model: Model, recorder: Recorder, leaves: dict[sp.Basic, Any]) -
         right = vector(*[leaves[u] for u, _ in model.chosen], *[0] * len(model.eliminated)) - vector(*rest)
         reason = f"{', '.join(names)} do not determine the speeds of the joints here"
         try:
-            found = SquareSystem(scratch, A, reason).solve(right)
+            result = SquareSystem(scratch, A, reason).solve(right)
         except ZeroDivisionError:
             raise ModelError([f"{', '.join(names)} do not determine the derivatives of the coordinates at any state; take speeds "
                               "that are independent of each other and of the velocity constraints"], model.name) from None
-        return dict(zip(model.own_speeds, recorder.name("v", found), strict=True))
+        return dict(zip(model.own_speeds, recorder.name("v", result), strict=True))

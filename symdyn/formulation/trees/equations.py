@@ -144,14 +144,14 @@ def _charts(model: Model) -> tuple[tuple[str, str, str, str], ...]:
 
 def _of_reactions(model: Model) -> tuple[str, ...]:
     """Outputs and rates of states that depend on multipliers or reactions."""
-    found = []
+    result = []
     values: list[tuple[str, Any]] = [(f"the rate of {z.symbol}", z.rate) for z in model.states]
     values += [(f"output {o.name}", o.value) for o in model.outputs if not isinstance(o.value, Point)]
     for what, value in values:
         kinds = {q.measure.kind for q in quantities_in(value if isinstance(value, tuple) else [value])}
         if kinds & {"multiplier", "reaction"}:
-            found.append(what)
-    return tuple(found)
+            result.append(what)
+    return tuple(result)
 
 
 def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:

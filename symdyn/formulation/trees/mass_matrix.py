@@ -48,7 +48,7 @@ def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
     """What the pivots of lockable speeds are compared with whose own link has no mass along them, so that the diagonal entry may
     be rounding, too."""
     unfelt = [(i, column, index) for i, link in enumerate(tree.links) for column, index in enumerate(link.speeds)
-              if tree.plain and index in tree.lockable and not felt(tree, i, link.S[:, column])]
+              if tree.plain and index in tree.vanishing_pivots and not felt(tree, i, link.S[:, column])]
     if not unfelt:
         return {}
     composite = own_inertias(tree)
@@ -159,7 +159,7 @@ def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str], letters: str 
         inverse[k] = 0 if is_zero(pivot) else algebra.name(f"i{letters}D{k + 1}", 1 / pivot)
         for i in columns:
             L[k, i] = algebra.name(f"{letters}L{k + 1}_{i + 1}", A[k, i] * inverse[k])
-        for place, i in enumerate(columns):
-            for j in columns[:place + 1]:
+        for index, i in enumerate(columns):
+            for j in columns[:index + 1]:
                 A[i, j] = A[i, j] - L[k, i] * A[k, j]
     return Factors(L, list(np.diagonal(A)), inverse, filled)

@@ -54,8 +54,8 @@ def inward(tree: Tree, wrenches: Sequence[Wrench]) -> np.ndarray:
     for k in reversed(range(len(tree.links))):
         link = tree.links[k]
         with algebra.section(f"link {link.name}: force and moment at its joint"):
-            for column, place in enumerate(link.speeds):
-                tau[place] = dot(link.S[:3, column], n[k]) + dot(link.S[3:, column], f[k])
+            for column, index in enumerate(link.speeds):
+                tau[index] = dot(link.S[:3, column], n[k]) + dot(link.S[3:, column], f[k])
             if link.parent != GROUND:
                 force = link.R @ f[k]
                 f[link.parent] = algebra.vector(f"f{link.parent + 1}", f[link.parent] + force)

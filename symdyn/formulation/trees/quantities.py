@@ -47,10 +47,10 @@ class TreeQuantities(Motion):
         model = tree.model
         super().__init__(tree.algebra, model.coordinates, model.speeds, tree.rates,
                          [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters,
-                         {**_locking_remarks(tree), **_gimbal_remarks(model)})
+                         {**_remarks_on_pivots(tree), **_gimbal_remarks(model)})
         self.tree = tree
         self.model = model
-        self.lockable = tree.lockable
+        self.vanishing_pivots = tree.vanishing_pivots
         self.kinematics = Kinematics(tree)
         self.loads = Loads(tree, self.kinematics, self._settled, self._touching if model.contacts else None)
         self.identification = Identification(tree, self.speed_rates)
@@ -152,7 +152,7 @@ class TreeQuantities(Motion):
             own["contact_coefficients"] = self.contact_coefficients
         limited = any(contact.depth is not None or contact.creep is not None for contact in self.model.compliant)
         if limited or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
-            own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
+            own["watches"] = lambda: vector(*[validity.value for validity in self.loads.watches()])
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation
         if self.model.contacts:
@@ -293,8 +293,8 @@ class TreeQuantities(Motion):
         """All that passes through each joint to its child: reaction, and what acts along the joint's speeds, (n_joints, 6)."""
         return self._of_joints(self.all_reactions(whole=True))
 
-    def _of_joints(self, found: dict[str, np.ndarray]) -> np.ndarray:
-        return np.array([found[j.name] for j in self.reacting], dtype=object).reshape(-1, 6)
+    def _of_joints(self, result: dict[str, np.ndarray]) -> np.ndarray:
+        return np.array([result[j.name] for j in self.reacting], dtype=object).reshape(-1, 6)
 
     def all_reactions(self, whole: bool = False) -> dict[str, np.ndarray]:
         """Joint name -> reaction, or whole: cut load."""
@@ -434,13 +434,13 @@ class TreeQuantities(Motion):
         return tau if self.tree.plain else self.tree.D.T @ tau if len(tau) else zeros(len(self.speeds))
 
 
-def _locking_remarks(tree: Tree) -> dict[Any, str]:
+def _remarks_on_pivots(tree: Tree) -> dict[Any, str]:
     """For speeds that may lose what they move to others: to which."""
     speeds = tree.model.speeds
-    others = {p: ", ".join(str(speeds[k]) for k in sorted(after)) for p, after in tree.lockable.items()}
+    others = {p: ", ".join(str(speeds[k]) for k in sorted(after)) for p, after in tree.vanishing_pivots.items()}
     return {speeds[p]: ": at this position it moves nothing that " + (
         f"{others[p]} {'does' if len(after) == 1 else 'do'} not move already" if after else "has mass")
-        for p, after in tree.lockable.items()}
+        for p, after in tree.vanishing_pivots.items()}
 
 
 def _gimbal_remarks(model: Model) -> dict[Any, str]:

@@ -93,8 +93,8 @@ def _beyond_rigid(tree: Tree, kinematics: Kinematics, motions: Sequence[LinkMoti
 def _closing(closure: Closure, lam: np.ndarray, act: Any, kinematics: Kinematics) -> np.ndarray:
     """The reaction of a closing joint; acts on both bodies like a load."""
     force, moment, back = zeros(3), zeros(3), zeros(3)
-    for row, place in zip(closure.rows, closure.places, strict=True):
-        force, moment, back = force - lam[place] * row.f, moment - lam[place] * row.n_c, back - lam[place] * row.n_p
+    for row, index in zip(closure.rows, closure.places, strict=True):
+        force, moment, back = force - lam[index] * row.f, moment - lam[index] * row.n_c, back - lam[index] * row.n_p
     seen = closure.seen
     for end, f, n in ((closure.child, force, moment), (closure.parent, -force, back)):
         R = seen.rotation(end.pose.link).T
@@ -157,15 +157,15 @@ def _on_joints(tree: Tree, along_speeds: np.ndarray | None) -> np.ndarray:
     """Forces along generalized speeds as forces along the joint speeds that these are; not along others that follow them."""
     result = zeros(len(tree.w))
     if along_speeds is not None:
-        for place, row in own_rows(tree).items():
-            result[row] = along_speeds[place]
+        for index, row in own_rows(tree).items():
+            result[row] = along_speeds[index]
     return result
 
 
 def own_rows(tree: Tree) -> dict[int, int]:
     """Place of a generalized speed among all -> that of the joint speed that it is; speeds that no joint has are left out."""
     places = {u: k for k, u in enumerate(tree.model.speeds)}
-    found: dict[int, int] = {}
+    result: dict[int, int] = {}
     for link in tree.links:
-        found.update({places[u]: row for u, row in zip(joint_speeds(link.joint), link.speeds, strict=True) if u in places})
-    return found
+        result.update({places[u]: row for u, row in zip(joint_speeds(link.joint), link.speeds, strict=True) if u in places})
+    return result

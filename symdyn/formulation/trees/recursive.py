@@ -125,7 +125,7 @@ class RecursiveTree(TreeQuantities):
             super().demand_inertia()
             return
         speeds = dict(zip(self.own, self.speeds, strict=True))
-        pivots = [(pivot, speeds[place]) for place, pivot in self.articulated().pivots]
+        pivots = [(pivot, speeds[index]) for index, pivot in self.articulated().pivots]
         demand_pivots(self.model, self.algebra.recorder, pivots)
 
     def reasons(self) -> list[str]:
@@ -133,7 +133,7 @@ class RecursiveTree(TreeQuantities):
         if self.own is None:
             return super().reasons()
         joints = joints_by_speed(self.model)
-        return [f"the articulated inertia S^T I^A S is not positive along {u}{self.remarks[u]}" if k in self.lockable else
+        return [f"the articulated inertia S^T I^A S is not positive along {u}{self.remarks[u]}" if k in self.vanishing_pivots else
                 f"{massless(u, joints.get(u))} (S^T I^A S is not positive){self.remarks.get(u, '')}"
                 for k, u in enumerate(self.speeds)]
 
@@ -144,7 +144,7 @@ class RecursiveTree(TreeQuantities):
     def _articulated(self) -> Articulated:
         assert self.own is not None
         reasons = dict(zip(self.own, self.reasons(), strict=True))
-        return Articulated(self.tree, reasons, {self.own[k] for k in self.lockable})
+        return Articulated(self.tree, reasons, {self.own[k] for k in self.vanishing_pivots})
 
     def solver(self) -> Solver:
         return super().solver() if self.own is None else _InSpeeds(self.articulated(), self.own)

@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.identification.joint_regrouping import coordinate_axis, unmoved
-from symdyn.formulation.probes.vanishing_pivots import lockable, places
+from symdyn.formulation.probes.vanishing_pivots import places, vanishing_pivots
 from symdyn.formulation.trees.axes import along_coordinate_axis
 from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.water import of_load
@@ -83,8 +83,8 @@ class Tree:
     added      added mass: number of a link, and that of the water it moves along, about its origin, link axes
     flexible   what elastic coordinates add to the links
     parallel   number of links whose frames are kept parallel to their parents'
-    lockable   generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds after
-               it that may then move what it moves (see locking)
+    vanishing_pivots   generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the
+               speeds after it that may then move what it moves (see massless_pivots)
     """
 
     model: Model
@@ -100,7 +100,7 @@ class Tree:
     added: tuple[tuple[int, ArticulatedInertia], ...] = ()
     flexible: tuple[FlexibleLink, ...] = ()
     parallel: int = 0
-    lockable: Mapping[int, frozenset[int]] = field(default_factory=dict)
+    vanishing_pivots: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
     @cached_property
     def plain(self) -> bool:
@@ -127,11 +127,11 @@ class Tree:
     @cached_property
     def driven(self) -> tuple[tuple[int, ...], ...]:
         """For each generalized speed the places of the joint speeds that it is part of: rows of D that are not zero."""
-        found: list[list[int]] = [[] for _ in self.model.speeds]
+        result: list[list[int]] = [[] for _ in self.model.speeds]
         for k, speeds in enumerate(self.drivers):
             for j in speeds:
-                found[j].append(k)
-        return tuple(map(tuple, found))
+                result[j].append(k)
+        return tuple(map(tuple, result))
 
     @cached_property
     def moved_by(self) -> Mapping[Joint | str, Link]:
@@ -144,9 +144,9 @@ class Tree:
         return frozenset(p.name for p, value in self.model.defaults.items() if value == 0)
 
     @cached_property
-    def locking(self) -> Mapping[int, frozenset[int]]:
-        """Those of the lockable speeds that then move no link with mass, nor a constraint between such links."""
-        return lockable(self, solid=True)
+    def massless_pivots(self) -> Mapping[int, frozenset[int]]:
+        """Those of the speeds with vanishing pivots that then move no link with mass, nor a constraint between such links."""
+        return vanishing_pivots(self, solid=True)
 
     @property
     def rigid(self) -> bool:
@@ -177,7 +177,7 @@ def build(model: Model, algebra: TapeAlgebra, aligned: bool = False, grouped: bo
     grouped   False: `effective` inertias are the links' own, to measure what grouping is worth
     """
     tree = _Builder(model, algebra, aligned, grouped).tree()
-    return replace(tree, lockable=lockable(tree))
+    return replace(tree, vanishing_pivots=vanishing_pivots(tree))
 
 
 @dataclass
@@ -234,7 +234,7 @@ class _Builder:
                 pose = ground if parent == -1 else poses[parent]
                 poses[child] = self._fixed(joint, pose) if isinstance(joint, Fixed) else self._part(joint, pose)
                 self._load(child, poses[child])
-            self._lump()
+            self._regroup()
         if self.aligned:
             self._align()
         links = tuple(self._link(k) for k in range(len(self.parts)))
@@ -310,7 +310,7 @@ class _Builder:
             part = self.parts[pose.link]
             part.inertia = part.inertia + about_com.moved(pose.R, pose.point(a.constants(body.com)))
 
-    def _lump(self) -> None:
+    def _regroup(self) -> None:
         """Count what a joint does not move to the parent, from the leaves inwards."""
         a = self.algebra
         with a.section("inertia of the links, about their joints"):
@@ -383,7 +383,7 @@ class _Builder:
     def _added(self, poses: Sequence[Pose]) -> tuple[tuple[int, ArticulatedInertia], ...]:
         a = self.algebra
         numbers = {body.name: k for k, body in enumerate(self.model.bodies)}
-        found: dict[int, ArticulatedInertia] = {}
+        result: dict[int, ArticulatedInertia] = {}
         for load in self.model.loads:
             if isinstance(load, AddedMass):
                 pose = poses[numbers[name_of(load.body)]]
@@ -391,12 +391,12 @@ class _Builder:
                     continue
                 with a.section(f"load {load.label}"):
                     added = of_load(a, load, pose.R, pose.point(a.constants(load.point)))
-                    found[pose.link] = found[pose.link] + added if pose.link in found else added
-        return tuple(sorted(found.items(), key=lambda item: item[0]))
+                    result[pose.link] = result[pose.link] + added if pose.link in result else added
+        return tuple(sorted(result.items(), key=lambda item: item[0]))
 
     def _flexible(self, links: Sequence[Link], poses: Sequence[Pose]) -> tuple[FlexibleLink, ...]:
         a = self.algebra
-        found = []
+        result = []
         for joint, parent in zip(self.model.joints, self.model.parents, strict=True):
             if not isinstance(joint, Modal):
                 continue
@@ -406,8 +406,8 @@ class _Builder:
             eta = a.constants(joint.coordinates)
             K, D = (a.expression(factor) * exactly(matrix) for factor, matrix in
                     ((joint.stiffness, joint.beam.K), (joint.damping, joint.beam.D)))
-            found.append(FlexibleLink(number, pose.link, pose.R, pose.p, speeds, eta, vector(*self.w[places]), K, D, joint.beam))
-        return tuple(found)
+            result.append(FlexibleLink(number, pose.link, pose.R, pose.p, speeds, eta, vector(*self.w[places]), K, D, joint.beam))
+        return tuple(result)
 
     def _worked(self, pose: Pose) -> Pose:
         """A body's pose in the frame that its link is worked in."""

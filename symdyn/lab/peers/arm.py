@@ -18,13 +18,13 @@ PUBLISHED = (388, 304)
 def counts(grouped: bool) -> tuple[int, int]:
     """Multiplications and additions for the PUMA 560, the fewest over frames; grouped: in base parameters."""
     model = get("puma560", general=True).check()
-    found = []
+    result = []
     for aligned in (False, True):
         recorder = Recorder()
         tree = build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), aligned, grouped)
         count = Tape.of(recorder, tau=TreeQuantities(tree).inverse_dynamics()).count()
-        found.append((count["mul"], count["add"]))
-    return min(found, key=sum)
+        result.append((count["mul"], count["add"]))
+    return min(result, key=sum)
 
 
 def misses() -> list[str]:

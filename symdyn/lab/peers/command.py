@@ -46,16 +46,16 @@ def find_derivatives_peers() -> tuple[list[derivatives.Peer], list[str]]:
 
 
 def _found(kinds: Sequence[tuple[str, Callable[[], Made]]]) -> tuple[list[Made], list[str]]:
-    found: list[Made] = []
+    result: list[Made] = []
     faults: dict[str, SymdynError] = {}
     for name, make in kinds:
         try:
-            found.append(make())
+            result.append(make())
         except SymdynError as error:
             faults[name] = error
-    if not found and all(isinstance(fault, MissingExtra) for fault in faults.values()):
+    if not result and all(isinstance(fault, MissingExtra) for fault in faults.values()):
         return [], ["the peers are not installed, symdyn is measured alone; run: pip install 'symdyn[peers]'"]
-    return found, [f"{name} is left out: {_in_one_line(fault)}" for name, fault in faults.items()]
+    return result, [f"{name} is left out: {_in_one_line(fault)}" for name, fault in faults.items()]
 
 
 def _in_one_line(fault: SymdynError) -> str:

@@ -63,9 +63,9 @@ class LoopRow:
 
     def scaled(self) -> dict[str, float]:
         """symdyn's time in ns on the machine of PUBLISHED, by each of the peers' times there and here."""
-        found = {start: self.fastest(start) for start in PUBLISHED}
+        result = {start: self.fastest(start) for start in PUBLISHED}
         return {start: self.times["symdyn with multipliers"] * PUBLISHED[start] / self.times[name]
-                for start, name in found.items() if name is not None}
+                for start, name in result.items() if name is not None}
 
 
 def four_bar_benchmark(peers: Sequence[Peer], repeats: int,

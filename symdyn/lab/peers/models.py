@@ -28,14 +28,14 @@ class Bound:
 
     def missed(self, operations: int, ratio: float | None, pinocchio: float | None, digits: int) -> list[str]:
         """What is missed, in words, ratios to CasADi with so many digits; what was not measured, None, misses nothing."""
-        found = []
+        result = []
         if self.operations is not None and operations > self.operations:
-            found.append(f"{operations} operations > {self.operations}")
+            result.append(f"{operations} operations > {self.operations}")
         if self.ratio is not None and ratio is not None and ratio > self.ratio:
-            found.append(f"symdyn/CasADi {ratio:.{digits}f} > {self.ratio:.2f}")
+            result.append(f"symdyn/CasADi {ratio:.{digits}f} > {self.ratio:.2f}")
         if self.pinocchio is not None and pinocchio is not None and pinocchio < self.pinocchio:
-            found.append(f"Pinocchio/symdyn {pinocchio:.1f} < {self.pinocchio:.1f}")
-        return found
+            result.append(f"Pinocchio/symdyn {pinocchio:.1f} < {self.pinocchio:.1f}")
+        return result
 
 
 class Timed:

@@ -20,9 +20,9 @@ def symdyn_program(equations: Equations, state: State) -> Program:
 
 def with_multipliers(equations: Equations) -> Equations:
     """The same equations with the quantity "rhs_lam": right-hand side and multipliers from one evaluation."""
-    there = equations.otherwise
+    there = equations.singular_fallback
     quantities = {**equations.quantities, "rhs_lam": lambda: np.concatenate([equations.quantity(n) for n in ("rhs", "lam")])}
-    return replace(equations, quantities=quantities, otherwise=None if there is None else with_multipliers(there))
+    return replace(equations, quantities=quantities, singular_fallback=None if there is None else with_multipliers(there))
 
 
 def constrained_program(equations: Equations, state: State) -> Program:

@@ -27,11 +27,11 @@ def agree(programs: Sequence[Program], model: str, what: str = "accelerations") 
 
 def _difference(results: Sequence[tuple[str, np.ndarray]], what: str, model: str) -> float:
     worst = 0.0
-    for name, found in results[1:]:
+    for name, result in results[1:]:
         first, wanted = results[0]
-        difference = float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        difference = float(np.linalg.norm(result - wanted) / np.linalg.norm(wanted))
         if not difference <= AGREEMENT:
-            raise SymdynError(f"{model}: {name} and {first} do not compute the same {what}, {found} and "
+            raise SymdynError(f"{model}: {name} and {first} do not compute the same {what}, {result} and "
                               f"{wanted}: they differ by {difference:.2g} of their norm, more than {AGREEMENT:.0e}; look for a "
                               "difference between the models that they were given")
         worst = max(worst, difference)

@@ -66,13 +66,13 @@ class Case:
 
     def formulations(self) -> list[Formulation]:
         """Derived; raises SymdynError where one does not fit."""
-        found = []
+        result = []
         for name, make in self.systems.items():
             made, skipped = SystemUnderTest(self.name, {"": make()}, self.end).formulated([name])
             if skipped:
                 raise SymdynError(str(skipped[0]))
-            found += made
-        return found
+            result += made
+        return result
 
     def error(self, values: np.ndarray, exact: np.ndarray) -> float:
         """The library's: differences relative to the exact value, or to THRESHOLD if that is larger, as root mean square over
@@ -107,8 +107,8 @@ def point(body: str, place: tuple[float, float, float], axes: str) -> History:
         assert system is not None
         k = [b.name for b in system.check().bodies].index(body)
         frames = module.evaluate("frames", t, x, module.default_parameters, np.zeros(0)).reshape(len(x), -1, 12)[:, k]
-        found = frames[:, :3] + frames[:, 3:].reshape(-1, 3, 3) @ np.array(place)
-        return found[:, ["xyz".index(axis) for axis in axes]]
+        result = frames[:, :3] + frames[:, 3:].reshape(-1, 3, 3) @ np.array(place)
+        return result[:, ["xyz".index(axis) for axis in axes]]
 
     return history
 

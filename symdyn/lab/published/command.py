@@ -45,8 +45,8 @@ class Result:
 
     def least(self, bound: float, peer: bool) -> tuple[Line, Run] | None:
         """The fastest within a bound, of other programs or of ours."""
-        found = [(line, run) for line in self.lines if line.peer == peer and (run := line.within(bound)) is not None]
-        return min(found, key=lambda both: both[1].time, default=None)
+        result = [(line, run) for line in self.lines if line.peer == peer and (run := line.within(bound)) is not None]
+        return min(result, key=lambda both: both[1].time, default=None)
 
     def missed(self) -> list[float]:
         """The bounds within which ours is not the first; none where that is not decided."""
@@ -64,8 +64,8 @@ class Result:
                f"{' and '.join(f'{b:g}' for b in case.bounds)}{' as published' * case.published}; reference: {self.reference}")
         yield f"{'program':26}{'formulation':14}{'bound':>8}{'rtol':>9}{'ms':>11}{'error':>10}"
         for bound in self.case.bounds:
-            found = [(line, run) for line in self.lines if (run := line.within(bound)) is not None]
-            for line, run in sorted(found, key=lambda both: both[1].time):
+            result = [(line, run) for line in self.lines if (run := line.within(bound)) is not None]
+            for line, run in sorted(result, key=lambda both: both[1].time):
                 yield (f"{line.program:26}{line.form:14}{bound:>8.0e}{run.tolerance:>9.0e}"
                        f"{run.time * 1e3:>11.4g}{run.error:>10.1e}")
             for line in self.lines:

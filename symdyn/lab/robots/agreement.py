@@ -39,12 +39,12 @@ def differences(equations: Equations, model: Model, peer: PinocchioRobot, n: int
     names = [s.name for s in (*model.coordinates, *model.speeds)] + [f"{s.name}_dot" for s in model.speeds]
     given = {p.name: model.defaults[p] for p in model.parameters} | dict(zip(names, [*q.T, *u.T, *ud.T], strict=True))
     tape = equations.tape(*NAMES.values())
-    found = evaluate_rows(tape, given, n)
+    result = evaluate_rows(tape, given, n)
     worst = dict.fromkeys(NAMES, 0.0)
     for k in range(n):
         wanted = peer.quantities(q[k], u[k], ud[k])
         for short, name in NAMES.items():
-            difference = float(np.linalg.norm(found[name][k] - wanted[short]) / np.linalg.norm(wanted[short]))
+            difference = float(np.linalg.norm(result[name][k] - wanted[short]) / np.linalg.norm(wanted[short]))
             if short == "ud":
                 difference /= float(np.linalg.cond(wanted["M"]))
             # a NaN is the worst of all

@@ -69,10 +69,10 @@ ROBOTS: tuple[Listed, ...] = (
 
 def folder() -> Path:
     """Where the package has the robots. Raises MissingExtra."""
-    found = next(_folders(), None)
-    if found is None:
+    result = next(_folders(), None)
+    if result is None:
         raise MissingExtra("the robots are not installed; run: pip install example-robot-data")
-    return found
+    return result
 
 
 def _folders() -> Iterator[Path]:

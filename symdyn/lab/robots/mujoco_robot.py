@@ -43,8 +43,8 @@ class MujocoRobot:
         numbers, at = Numbers(self.source, []), {self.c.name("joint", j): self.c.joint(j)[1:] for j in range(self.m.njnt)}
         q_at, u_at = dict.fromkeys(self.source.coordinates, -1), dict.fromkeys(self.source.speeds, -1)
         for joint in self.source.joints:
-            found = [(s.name, [s.coordinate], [s.speed]) for s in scalars_of(joint, numbers)]
-            for name, own, speeds in found or [(joint.name, list(joint.coordinates), list(joint_speeds(joint)))]:
+            result = [(s.name, [s.coordinate], [s.speed]) for s in scalars_of(joint, numbers)]
+            for name, own, speeds in result or [(joint.name, list(joint.coordinates), list(joint_speeds(joint)))]:
                 if name in at:
                     for n, q in enumerate(own):
                         q_at[q] = at[name][0] + n
@@ -66,8 +66,8 @@ class MujocoRobot:
             self.mj.mju_quat2Mat(flat, m.body_iquat[k])
             R = flat.reshape(3, 3)
             wanted = [np.array([m.body_mass[k]]), m.body_ipos[k], R @ np.diag(m.body_inertia[k]) @ R.T]
-            found = [np.array([float(body.mass)]), np.array(body.com, dtype=float).ravel(), np.array(body.inertia, dtype=float)]
-            for a, b in zip(found, wanted, strict=True):
+            result = [np.array([float(body.mass)]), np.array(body.com, dtype=float).ravel(), np.array(body.inertia, dtype=float)]
+            for a, b in zip(result, wanted, strict=True):
                 size = float(np.abs(b).max())
                 worst = max(worst, float(np.abs(a - b).max()) / (size or 1.0))
         return worst
@@ -152,23 +152,23 @@ class MujocoRobot:
         else:
             points = [data[3:6], data[:3]] if weld else [data[:3], data[3:6]]
             turns = [rotation(data[6:10]) if weld else np.eye(3), np.eye(3)]
-        found: list[Any] = []
+        result: list[Any] = []
         for body, point in zip(ends, points, strict=True):
             R = d.xmat[body].reshape(3, 3)
             at = d.xpos[body] + R @ point
             jacobians = [np.zeros((3, m.nv)) for _ in range(4)]
             mj.mj_jac(m, d, jacobians[0], jacobians[1], at, body)
             mj.mj_jacDot(m, d, jacobians[2], jacobians[3], at, body)
-            found.append((at, R, *jacobians))
-        residual, J, rest = (found[0][0] - found[1][0], found[0][2] - found[1][2], (found[0][4] - found[1][4]) @ d.qvel)
+            result.append((at, R, *jacobians))
+        residual, J, rest = (result[0][0] - result[1][0], result[0][2] - result[1][2], (result[0][4] - result[1][4]) @ d.qvel)
         if weld:
-            A, B = (f[1] @ turn for f, turn in zip(found, turns, strict=True))
+            A, B = (f[1] @ turn for f, turn in zip(result, turns, strict=True))
             error = A @ B.T
             off = np.array([error[2, 1] - error[1, 2], error[0, 2] - error[2, 0], error[1, 0] - error[0, 1]]) / 2
             off = off if np.trace(error) > 0 else off + 1.0
             residual = np.concatenate([residual, off])
-            J = np.vstack([J, found[0][3] - found[1][3]])
-            rest = np.concatenate([rest, (found[0][5] - found[1][5]) @ d.qvel])
+            J = np.vstack([J, result[0][3] - result[1][3]])
+            rest = np.concatenate([rest, (result[0][5] - result[1][5]) @ d.qvel])
         return residual, J, rest
 
     def _coupling(self, e: int, tendon: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

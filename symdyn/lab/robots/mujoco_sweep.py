@@ -94,11 +94,11 @@ def measure_system(system: System, path: Path, folder: Path, states: int = STATE
         row.constraints = len(peer.constraints()[0]) if closed else 0
         M = peer.mass_matrix()
         x = peer.state()
-        found = module.rhs(0.0, x, inputs=peer.commands())
+        result = module.rhs(0.0, x, inputs=peer.commands())
         n_q, n_u = len(model.coordinates), len(model.speeds)
         ours = module.mass_matrix(x[:n_q])
         row.M = max(row.M, _apart(ours, M[np.ix_(peer.u_at, peer.u_at)]))
-        row.ud = max(row.ud, _apart(found[n_q:n_q + n_u], wanted[peer.u_at]))
+        row.ud = max(row.ud, _apart(result[n_q:n_q + n_u], wanted[peer.u_at]))
         row.condition = max(row.condition, float(np.linalg.cond(M)))
     return row
 
@@ -134,6 +134,6 @@ def run(paths: Sequence[str | Path], folder: str | Path | None = None, states: i
     return counts["read"] - counts["agree"]
 
 
-def _apart(found: np.ndarray, wanted: np.ndarray) -> float:
+def _apart(result: np.ndarray, wanted: np.ndarray) -> float:
     size = float(np.linalg.norm(wanted))
-    return float(np.linalg.norm(found - wanted)) / size if size else float(np.linalg.norm(found))
+    return float(np.linalg.norm(result - wanted)) / size if size else float(np.linalg.norm(result))

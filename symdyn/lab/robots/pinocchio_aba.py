@@ -50,10 +50,10 @@ class PinocchioAba:
         """Operations + - * / sqrt sin cos of one evaluation, as they are done, those with zeros and ones included."""
         message = ctypes.create_string_buffer(ERROR_SIZE)
         at, v = robot.q(q), robot.matrix(q) @ u
-        found = self.library.aba_operations(_text(robot), address(at), address(v), message, ctypes.c_long(ERROR_SIZE))
-        if found < 0:
+        result = self.library.aba_operations(_text(robot), address(at), address(v), message, ctypes.c_long(ERROR_SIZE))
+        if result < 0:
             raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
-        return int(found)
+        return int(result)
 
 
 def _text(robot: PinocchioRobot) -> bytes:

@@ -109,8 +109,8 @@ def _row(example: Example) -> int:
     worst = 0.0
     for x, given in states:
         expected = theirs(x, given)
-        found = module.rhs(0.0, x, inputs=given)[:len(expected)]
-        worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
+        result = module.rhs(0.0, x, inputs=given)[:len(expected)]
+        worst = max(worst, float(np.abs(result - expected).max() / np.abs(expected).max()))
     of_slopes = 0.0 if example.slow else _of_slopes(derived, equations, module, states[:5])
     x, given = states[0]
     loop = compiled_loop(equations, x, name="rhs")
@@ -132,15 +132,15 @@ def _of_slopes(derived: Derived, equations: Equations, module: Any, states: Sequ
     theirs, worst = differentiated(derived, equations), 0.0
     for x, given in states:
         expected = theirs(x, given)
-        found = module.jacobian(0.0, x, inputs=given).x[:len(expected), :expected.shape[1]]
-        worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
+        result = module.jacobian(0.0, x, inputs=given).x[:len(expected), :expected.shape[1]]
+        worst = max(worst, float(np.abs(result - expected).max() / np.abs(expected).max()))
     return worst
 
 
 def _bicycle(module: Any) -> int:
     """Compare the eigenvalues at 5 m/s with the published ones."""
-    found = np.linalg.eigvals(module.linearize().A)
-    moving = np.array(sorted(found[np.abs(found) > 1e-6], key=lambda e: (e.real, e.imag)))
+    result = np.linalg.eigvals(module.linearize().A)
+    moving = np.array(sorted(result[np.abs(result) > 1e-6], key=lambda e: (e.real, e.imag)))
     worst = float(np.abs(moving - np.array(BICYCLE_EIGENVALUES)).max())
     print(f"  eigenvalues at 5 m/s: {worst:.1e} 1/s from the published ones{'' if worst <= OF_EIGENVALUES else '  MISSED'}")
     return int(worst > OF_EIGENVALUES)

@@ -33,11 +33,11 @@ def value_of(value: Any, defaults: Mapping[sp.Basic | str, float]) -> float | No
 
 def range_faults(where: str, numbers: Mapping[str, float]) -> list[str]:
     """Coefficients and lengths that are negative, and a restitution above one; numbers: by name, of those that are known."""
-    found = [f"{where}: {what} is {value:g}; pass a number that is not negative" for what, value in numbers.items() if value < 0]
+    result = [f"{where}: {what} is {value:g}; pass a number that is not negative" for what, value in numbers.items() if value < 0]
     if numbers.get("restitution", 0) > 1:
-        found.append(f"{where}: restitution is {numbers['restitution']:g}, which would gain energy in every impact; "
-                     "pass a number from 0 to 1")
-    return found
+        result.append(f"{where}: restitution is {numbers['restitution']:g}, which would gain energy in every impact; "
+                      "pass a number from 0 to 1")
+    return result
 
 
 def above(where: str, kinetic: float, static: float) -> str:

@@ -182,18 +182,18 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
 
 def _ranges(given: Compliance) -> list[Range]:
     """What the numbers of a compliance may be."""
-    found = [Range("stiffness", given.stiffness, reached=False), Range("exponent", given.exponent, 1.0),
-             Range("dissipation", given.dissipation), Range("slip_speed", given.slip_speed, reached=False),
-             Range("viscous", given.viscous)]
-    found += [Range(what, value, reached=False) for what, value in (("stribeck", given.stribeck), ("depth", given.depth),
+    result = [Range("stiffness", given.stiffness, reached=False), Range("exponent", given.exponent, 1.0),
+              Range("dissipation", given.dissipation), Range("slip_speed", given.slip_speed, reached=False),
+              Range("viscous", given.viscous)]
+    result += [Range(what, value, reached=False) for what, value in (("stribeck", given.stribeck), ("depth", given.depth),
                                                                         ("creep", given.creep))
-              if value is not None]
+               if value is not None]
     if isinstance(given.bristles, Bristles):
-        found += [Range("stiffness of bristles", given.bristles.stiffness, reached=False),
-                  Range("damping of bristles", given.bristles.damping)]
+        result += [Range("stiffness of bristles", given.bristles.stiffness, reached=False),
+                   Range("damping of bristles", given.bristles.damping)]
         if given.bristles.elastic is not None:
-            found.append(Range("elastic part of bristles", given.bristles.elastic, below=1.0))
-    return found
+            result.append(Range("elastic part of bristles", given.bristles.elastic, below=1.0))
+    return result
 
 
 def by_parameters(ranges: Iterable[Range]) -> tuple[Range, ...]:
@@ -219,25 +219,25 @@ def compliance_faults(where: str, given: object, numbers: Callable[[Any], float 
     """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
-    found = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]
+    result = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]
     if given.stribeck is None and not (static - kinetic).is_zero:
-        found.append(f"{where}: static friction is {static} and kinetic friction {kinetic}, and compliant contacts take static "
-                     "friction by Stribeck's curve; pass stribeck=, m/s, to the compliance, or one coefficient of friction")
+        result.append(f"{where}: static friction is {static} and kinetic friction {kinetic}, and compliant contacts take static "
+                      "friction by Stribeck's curve; pass stribeck=, m/s, to the compliance, or one coefficient of friction")
     limits = (("depth", given.depth), ("creep", given.creep))
-    found += [f"{where}: {what} is {value}; pass a number, in m" for what, value in limits
-              if isinstance(value, sp.Basic) and not value.is_number]
+    result += [f"{where}: {what} is {value}; pass a number, in m" for what, value in limits
+               if isinstance(value, sp.Basic) and not value.is_number]
     if given.creep is not None and numbers(kinetic) == 0:
-        found.append(f"{where}: creep is limited, and there is no friction that holds; pass friction, or leave creep out")
+        result.append(f"{where}: creep is limited, and there is no friction that holds; pass friction, or leave creep out")
     if isinstance(given.bristles, Bristles):
         if numbers(kinetic) == 0:
-            found.append(f"{where}: bristles need friction; pass friction, or leave bristles out")
+            result.append(f"{where}: bristles need friction; pass friction, or leave bristles out")
     elif given.bristles is not None:
-        found.append(f"{where}: bristles is {shown(given.bristles)}; pass sd.contacts.Bristles(...), or None")
+        result.append(f"{where}: bristles is {shown(given.bristles)}; pass sd.contacts.Bristles(...), or None")
     for what, value, least, reached, below in _ranges(given):
         wrong = Faults()
         wrong.expression(value, f"{where}: {what}")
-        found += wrong
+        result += wrong
         number = None if wrong else numbers(value)
         if number is not None and not in_range(number, least, reached, below):
-            found.append(f"{where}: {what} is {number:g}; {range_text(least, reached, below)}")
-    return found
+            result.append(f"{where}: {what} is {number:g}; {range_text(least, reached, below)}")
+    return result

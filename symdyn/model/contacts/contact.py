@@ -91,15 +91,15 @@ class Contact:
     @property
     def lengths(self) -> dict[str, sp.Expr]:
         """Radii and lengths of its shapes, by what they are called in messages."""
-        found = {}
+        result = {}
         for what, shape in (("on a", self.on_a), ("on b", self.on_b)):
             for kind in ("radius", "length", "tube"):
                 if hasattr(shape, kind) and not isinstance(shape, Cam):
-                    found[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
+                    result[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
             if isinstance(shape, Box):
-                found |= {f"edge {k + 1} of the box": Faults().expression(e, "size") for k, e in enumerate(
+                result |= {f"edge {k + 1} of the box": Faults().expression(e, "size") for k, e in enumerate(
                     shape.size if isinstance(shape.size, (list, tuple)) else ())}
-        return found
+        return result
 
     @property
     def room(self) -> sp.Expr | None:
@@ -121,8 +121,8 @@ class Contact:
     @property
     def ranges(self) -> list[Range]:
         """What radii and lengths of its shapes, and its room in a bore, may be."""
-        found = [Range(what, length, reached=self._may_vanish(what)) for what, length in self.lengths.items()]
-        return found if self.room is None else [*found, Range("room in the bore", self.room, reached=False)]
+        result = [Range(what, length, reached=self._may_vanish(what)) for what, length in self.lengths.items()]
+        return result if self.room is None else [*result, Range("room in the bore", self.room, reached=False)]
 
     def _may_vanish(self, what: str) -> bool:
         """Whether a radius or length may be 0, as that of a sphere, which is a point then, or of a tube."""
@@ -130,25 +130,25 @@ class Contact:
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
-        found = []
+        result = []
         values = {"static friction": self.static, "kinetic friction": self.kinetic, "restitution": self.restitution}
         values |= self.lengths
         number = partial(value_of, defaults=defaults)
         if self.law == "compliant":
-            found += compliance_faults(self.where, self.compliance, number, self.static, self.kinetic)
+            result += compliance_faults(self.where, self.compliance, number, self.static, self.kinetic)
         numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
-        found += range_faults(self.where, numbers)
-        found += [f"{self.where}: {what} is 0; pass a length above 0" for what in self.lengths
-                  if numbers.get(what) == 0 and not self._may_vanish(what)]
+        result += range_faults(self.where, numbers)
+        result += [f"{self.where}: {what} is 0; pass a length above 0" for what in self.lengths
+                   if numbers.get(what) == 0 and not self._may_vanish(what)]
         room = None if self.room is None else number(self.room)
-        if room is not None and room <= 0 and not found:
-            found.append(f"{self.where}: the {type(self.on_a).__name__} on a does not fit into the Bore on b, which is "
-                         f"{-room:g} m too small; pass a larger bore")
-        found += self._cam_faults(defaults)
+        if room is not None and room <= 0 and not result:
+            result.append(f"{self.where}: the {type(self.on_a).__name__} on a does not fit into the Bore on b, which is "
+                          f"{-room:g} m too small; pass a larger bore")
+        result += self._cam_faults(defaults)
         static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))
         if static is not None and kinetic is not None and kinetic > static >= 0:
-            found.append(above(self.where, kinetic, static))
-        return found
+            result.append(above(self.where, kinetic, static))
+        return result
 
     def _cam_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """A cam whose radius is not positive all around, as far as it has numbers."""
@@ -166,13 +166,13 @@ class Contact:
 
     def structure_faults(self, planar: bool) -> list[str]:
         """Shapes that do not fit each other or the plane."""
-        a, b, found = self.on_a, self.on_b, list[str]()
+        a, b, result = self.on_a, self.on_b, list[str]()
         kind_a, kind_b = type(a).__name__, type(b).__name__
         if planar and isinstance(a, (Disc, Torus, Cylinder)):
-            found.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")
+            result.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")
         if isinstance(b, Surface if planar else (Curve, Cam)):
-            found.append(f"{self.where}: a {kind_b} belongs to a {'spatial' if planar else 'planar'} system; pass a "
-                         f"{'Curve' if planar else 'Surface'}")
+            result.append(f"{self.where}: a {kind_b} belongs to a {'spatial' if planar else 'planar'} system; pass a "
+                          f"{'Curve' if planar else 'Surface'}")
         if isinstance(a, Box) and length_of(a.size) not in ((2,) if planar else (3,)):
-            found.append(f"{self.where}: size is {shown(a.size)}; pass {'two' if planar else 'three'} lengths")
-        return found
+            result.append(f"{self.where}: size is {shown(a.size)}; pass {'two' if planar else 'three'} lengths")
+        return result

@@ -40,7 +40,7 @@ NEARLY = 1e-9
 REAL = (sp.Symbol("abscissa x", real=True), sp.Symbol("abscissa y", real=True))
 # Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
 AROUND = 12
-BESIDE = (-0.95, -0.7, -0.45, -0.2, 0.2, 0.45, 0.7, 0.95)
+NEARBY = (-0.95, -0.7, -0.45, -0.2, 0.2, 0.45, 0.7, 0.95)
 RINGS = ((0.4, 6), (0.8, 8))
 
 
@@ -247,15 +247,15 @@ class Geometry:
     def _written(self, value: Any, symbols: Mapping[sp.Symbol, sp.Symbol], what: str) -> sp.Expr | None:
         """An expression of what is fixed to body b, in other symbols; None, with faults, where it moves or jumps."""
         where, before, kind = self.contact.where, len(self.faults), type(self.contact.on_b).__name__
-        found = self.faults.expression(value, f"{where}: {what}").xreplace(dict(symbols))
-        moving = sorted(str(s) for s in found.free_symbols if isinstance(s, Moving) or s == time)
+        result = self.faults.expression(value, f"{where}: {what}").xreplace(dict(symbols))
+        moving = sorted(str(s) for s in result.free_symbols if isinstance(s, Moving) or s == time)
         if moving:
             self.faults.append(f"{where}: the {what} depends on {', '.join(moving)}; a {kind} is fixed to its body: write it by "
                                f"{', '.join(map(str, symbols))} and parameters, and let the body move")
-        if any(found.diff(s).atoms(sp.Derivative, sp.Subs, sp.DiracDelta) for s in symbols.values()):
+        if any(result.diff(s).atoms(sp.Derivative, sp.Subs, sp.DiracDelta) for s in symbols.values()):
             self.faults.append(f"{where}: the {what} {shown(value)} has no slope everywhere; leave out what jumps, such as Mod, "
                                "floor and sign")
-        return found if len(self.faults) == before else None
+        return result if len(self.faults) == before else None
 
     def _touching(self, symbols: Sequence[sp.Symbol], height: sp.Expr, center: Sequence[sp.Expr],
                   shape: Round) -> tuple[tuple[sp.Expr, ...], sp.Expr]:
@@ -290,19 +290,21 @@ class Geometry:
                             for s, k in zip(unknowns, residual, strict=True))
             return Implicit(unknowns, (*known, *above), own.radius + own.tube, lever[n] - f, residual, tuple(others), nearest)
 
-        found = self._found(implicit, given, "surface" if n == 2 else "curve", self._spline)
-        return (tuple(center[:n]), height) if found is None else (found[0], height if found[1] is None else found[1].at(*symbols))
+        result = self._found(implicit, given, "surface" if n == 2 else "curve", self._spline)
+        if result is None:
+            return tuple(center[:n]), height
+        return result[0], height if result[1] is None else result[1].at(*symbols)
 
     def _found(self, implicit: Callable[[Spline | None], Implicit], given: Sequence[sp.Expr], what: str,
                spline: Spline | None = None) -> tuple[tuple[sp.Expr, ...], Spline | None] | None:
         """The unknowns of a touching point as functions of what is given; None, with a fault, where they have no text."""
         try:
-            found, together = touching_of(f"touching_{self.contact.name}", f"contact {self.contact.name}: the {what}", implicit,
-                                          spline)
+            result, together = touching_of(f"touching_{self.contact.name}", f"contact {self.contact.name}: the {what}", implicit,
+                                           spline)
         except UnsupportedExpression as error:
             self.faults.append(f"{self.contact.where}: {error}")
             return None
-        return tuple(found.applied(given)), together
+        return tuple(result.applied(given)), together
 
     def _outside_cam(self, name: str, at: Place, radius: sp.Expr) -> Touch:
         """A point, or a circle around it, outside a closed curve of body b, in polar coordinates; see Tangent."""
@@ -367,7 +369,7 @@ class Geometry:
         def implicit(spline: Spline | None) -> Implicit:
             R, slope = (e.xreplace(names) for e in self._radius_of_cam(spline))
             tangent, others = _tangent(R, slope, r), []
-            for share in BESIDE:
+            for share in NEARBY:
                 angle = center + sp.Float(share) * r / away
                 there = R.xreplace({phi: angle})
                 square = r**2 - (there * sp.sin(angle - center))**2
@@ -378,8 +380,8 @@ class Geometry:
             return Implicit((phi,), known, sp.S.One, -tangent.reach, residual, tuple(others),
                             (phi + deep.turned - center,) if self.yields else ())
 
-        found = self._found(implicit, (psi, far, radius, *parameters), "cam", self._spline)
-        return (psi, None) if found is None else (found[0][0], found[1])
+        result = self._found(implicit, (psi, far, radius, *parameters), "cam", self._spline)
+        return (psi, None) if result is None else (result[0][0], result[1])
 
     def _in_b(self, v: Triple) -> Triple:
         """A vector of the n-frame in the axes of body b."""
@@ -422,12 +424,12 @@ class Geometry:
         return self._components("position", body, at, 1)
 
     def _components(self, kind: str, body: str, at: Place, order: int) -> Triple:
-        found = [Quantity(Measure(kind, (body,), (tuple(at),), (k,), order)) for k in range(2 if self.planar else 3)]
-        return (*found, sp.S.Zero)[:3]
+        result = [Quantity(Measure(kind, (body,), (tuple(at),), (k,), order)) for k in range(2 if self.planar else 3)]
+        return (*result, sp.S.Zero)[:3]
 
     def _omega(self, body: str) -> Triple:
-        found = [Quantity(Measure("angular_velocity", (body,), index=(k,))) for k in range(3)]
-        return (sp.S.Zero, sp.S.Zero, found[2]) if self.planar else (found[0], found[1], found[2])
+        result = [Quantity(Measure("angular_velocity", (body,), index=(k,))) for k in range(3)]
+        return (sp.S.Zero, sp.S.Zero, result[2]) if self.planar else (result[0], result[1], result[2])
 
     # -- numbers
 
@@ -498,7 +500,7 @@ def _other_points(shape: Round, lever: Triple, normal: Triple, n: int) -> list[t
         return [_add(_add(_scaled(to_circle, c), _scaled(turned, s)), _scaled(normal, shape.tube), -1)
                 for c, s in ((sp.Float(c), sp.Float(s)) for c, s in circle_of_points(AROUND)[1:])]
     if n == 1:
-        return [(sp.Float(k) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius) for k in BESIDE]
+        return [(sp.Float(k) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius) for k in NEARBY]
     return [(sp.Float(k * c) * shape.radius, sp.Float(k * s) * shape.radius, -sp.sqrt(1 - sp.Float(k)**2) * shape.radius)
             for k, count in RINGS for c, s in circle_of_points(count)]
 

@@ -58,7 +58,7 @@ class Spline(UserFunction):
                 total = total + recorder.call(self, higher)[0] * changes[k]
         return [total]
 
-    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+    def slope(self, index: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
         higher = self._higher(k, arguments)
         return self.applied(higher)[0] if higher[len(self.degrees) + k] <= self.degrees[k] else sp.S.Zero
 
@@ -75,8 +75,8 @@ class LineSpline(Spline):
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
         x, order = symdyn_stacked(values)
-        found = piece_spline(np.array(self.knots[0]), np.array(self.coefficients), x, int(np.max(order, initial=0)))
-        return np.asarray(found)[..., None]
+        result = piece_spline(np.array(self.knots[0]), np.array(self.coefficients), x, int(np.max(order, initial=0)))
+        return np.asarray(result)[..., None]
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
         x, order = values
@@ -93,9 +93,9 @@ class GridSpline(Spline):
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
         x, y, *orders = symdyn_stacked(values)
-        found = grid_spline([np.array(t) for t in self.knots], self.degrees, np.array(self.coefficients), (x, y),
-                            _orders([float(np.max(v, initial=0)) for v in orders]))
-        return np.asarray(found)[..., None]
+        result = grid_spline([np.array(t) for t in self.knots], self.degrees, np.array(self.coefficients), (x, y),
+                             _orders([float(np.max(v, initial=0)) for v in orders]))
+        return np.asarray(result)[..., None]
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
         x, y, *orders = values

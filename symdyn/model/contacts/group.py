@@ -131,11 +131,11 @@ def _coefficient_faults(system: System, group: ContactGroup) -> list[str]:
     """Coefficients and radii that cannot be, with the numbers that parameters have."""
     values = {"static friction": group.static, "kinetic friction": group.kinetic, "restitution": group.restitution}
     numbers = {what: value for what, e in values.items() if (value := value_of(e, system.defaults)) is not None}
-    found = range_faults(group.where, numbers)
+    result = range_faults(group.where, numbers)
     static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))
     if static is not None and kinetic is not None and kinetic > static:
-        found.append(above(group.where, kinetic, static))
+        result.append(above(group.where, kinetic, static))
     radii = {value_of(radius, system.defaults) for radius in {shape.radius for shape in group.shapes}}
     if any(radius is not None and radius <= 0 for radius in radii):
-        found.append(f"{group.where}: a radius is not positive; pass lengths in m")
-    return found
+        result.append(f"{group.where}: a radius is not positive; pass lengths in m")
+    return result

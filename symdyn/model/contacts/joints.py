@@ -72,14 +72,14 @@ class JointElement:
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Numbers that cannot be, with those that parameters have, and laws of impacts that there are not."""
-        found = [] if self.impact in IMPACTS else [f"{self.where}: impact is {shown(self.impact)}; there are "
-                                                   f"{', '.join(map(repr, IMPACTS))}"]
+        result = [] if self.impact in IMPACTS else [f"{self.where}: impact is {shown(self.impact)}; there are "
+                                                    f"{', '.join(map(repr, IMPACTS))}"]
         for what, (expression, least, most) in self.bounds.items():
             value = value_of(expression, defaults)
             if value is not None and not least <= value <= most:
                 limits = f"from {least:g} on" if most == math.inf else f"from {least:g} to {most:g}"
-                found.append(f"{self.where}: {what} is {value:g}; pass a number {limits}")
-        return found
+                result.append(f"{self.where}: {what} is {value:g}; pass a number {limits}")
+        return result
 
     def _number(self, value: Any, what: str, least: float = 0.0, most: float = math.inf) -> sp.Expr:
         expression = self.faults.expression(value, f"{self.where}: {what}")
@@ -89,17 +89,17 @@ class JointElement:
     def _coordinate(self, system: System, joint: Any, faults: Faults) -> tuple[Any, Any] | None:
         """A joint of one degree of freedom with its coordinate."""
         joints = {name_of(j): j for j in system.joints}
-        found = joints.get(joint) if isinstance(joint, str) else next((j for j in system.joints if j is joint), None)
-        if found is None:
+        result = joints.get(joint) if isinstance(joint, str) else next((j for j in system.joints if j is joint), None)
+        if result is None:
             faults.append(f"{self.where} is at the joint {shown(joint)}, which the system does not have; joints: "
                           f"{', '.join(map(str, joints)) or 'none'}")
             return None
-        coordinates = found.coordinates
+        coordinates = result.coordinates
         if len(coordinates) != 1 or not isinstance(coordinates[0], Coordinate):
-            faults.append(f"{self.where}: the joint {shown(found.name)} has the coordinates {', '.join(map(str, coordinates))}; "
+            faults.append(f"{self.where}: the joint {shown(result.name)} has the coordinates {', '.join(map(str, coordinates))}; "
                           "pass a joint with one degree of freedom and a coordinate of its own, such as a Revolute")
             return None
-        return found, coordinates[0]
+        return result, coordinates[0]
 
     def _relative(self, system: System, joint: Any, other: Any, ratio: sp.Expr,
                   faults: Faults) -> tuple[sp.Expr, sp.Expr, tuple[tuple[Any, sp.Expr], ...]] | None:
@@ -143,10 +143,10 @@ class Stop(JointElement):
             self.faults.append(f"{self.where} has neither lower nor upper; pass one of them, or both")
 
     def rows(self, system: System, faults: Faults) -> list[Row]:
-        found = self._relative(system, self.joint, None, sp.S.One, faults)
-        if found is None:
+        result = self._relative(system, self.joint, None, sp.S.One, faults)
+        if result is None:
             return []
-        q, rate, on = found
+        q, rate, on = result
         rows = []
         for what, end in self.ends.items():
             sign = 1 if what == "lower" else -1
@@ -154,11 +154,11 @@ class Stop(JointElement):
         return rows
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
-        found = super().number_faults(defaults)
+        result = super().number_faults(defaults)
         lower, upper = (value_of(self.ends[what], defaults) if what in self.ends else None for what in ("lower", "upper"))
         if lower is not None and upper is not None and lower >= upper:
-            found.append(f"{self.where}: lower is {lower:g} and upper {upper:g}; pass a lower one below the upper")
-        return found
+            result.append(f"{self.where}: lower is {lower:g} and upper {upper:g}; pass a lower one below the upper")
+        return result
 
 
 class Backlash(JointElement):
@@ -183,10 +183,10 @@ class Backlash(JointElement):
         self.restitution = self._number(restitution, "restitution", 0.0, 1.0)
 
     def rows(self, system: System, faults: Faults) -> list[Row]:
-        found = self._relative(system, self.joint, self.other, self.ratio, faults)
-        if found is None:
+        result = self._relative(system, self.joint, self.other, self.ratio, faults)
+        if result is None:
             return []
-        q, rate, on = found
+        q, rate, on = result
         return [Row(f"{self.name}_{what}", STOP, self.width / 2 + sign * q, sign * rate, _signed(on, sign))
                 for what, sign in (("lower", 1), ("upper", -1))]
 
@@ -216,10 +216,10 @@ class OneWayClutch(JointElement):
             self.direction = 1
 
     def rows(self, system: System, faults: Faults) -> list[Row]:
-        found = self._relative(system, self.joint, self.other, self.ratio, faults)
-        if found is None:
+        result = self._relative(system, self.joint, self.other, self.ratio, faults)
+        if result is None:
             return []
-        _, rate, on = found
+        _, rate, on = result
         return [Row(self.name, CLUTCH, self.direction * rate, self.direction * rate, _signed(on, self.direction))]
 
 
@@ -246,16 +246,16 @@ class JointFriction(JointElement):
         self.ratio = self.faults.expression(ratio, f"{self.where}: ratio")
 
     def rows(self, system: System, faults: Faults) -> list[Row]:
-        found = self._relative(system, self.joint, self.other, self.ratio, faults)
-        return [] if found is None else [Row(self.name, FRICTION, sp.S.Zero, found[1], found[2])]
+        result = self._relative(system, self.joint, self.other, self.ratio, faults)
+        return [] if result is None else [Row(self.name, FRICTION, sp.S.Zero, result[1], result[2])]
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
-        found = super().number_faults(defaults)
+        result = super().number_faults(defaults)
         static, kinetic = (value_of(e, defaults) for e in (self.static, self.kinetic))
         if static is not None and kinetic is not None and kinetic > static:
-            found.append(f"{self.where}: sliding is {kinetic:g} and breakaway {static:g}; pass a breakaway torque "
-                         "that is not below the sliding one")
-        return found
+            result.append(f"{self.where}: sliding is {kinetic:g} and breakaway {static:g}; pass a breakaway torque "
+                          "that is not below the sliding one")
+        return result
 
 
 class Rope(JointElement):
@@ -303,10 +303,10 @@ class Rope(JointElement):
         return [Row(self.name, STOP, self.length - apart, -rate, ())]
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
-        found = super().number_faults(defaults)
+        result = super().number_faults(defaults)
         if value_of(self.length, defaults) == 0:
-            found.append(f"{self.where}: length is 0; pass a length above 0, or a joint where both points stay together")
-        return found
+            result.append(f"{self.where}: length is 0; pass a length above 0, or a joint where both points stay together")
+        return result
 
     def act(self, row: Row, force: sp.Expr) -> list[JointForce | ForceBetween]:
         return [ForceBetween(self.a, self.b, force, self.at[0], self.at[1], self.where, self.span)]

@@ -87,8 +87,8 @@ class Implicit:
             of_k = taken(*k)
             return of_k, jacobian(recorder, of_k, leaves[:n], "forward").ravel().tolist()
 
-        found = [with_slopes(k) for k in (self.residual, self.nearest) if k]
-        (residual, slopes), (last, last_slopes) = found[0], found[-1]
+        result = [with_slopes(k) for k in (self.residual, self.nearest) if k]
+        (residual, slopes), (last, last_slopes) = result[0], result[-1]
         right = forward(recorder, last, dict(zip(leaves[n:], changes, strict=True)))
         return Recorded(leaves, changes, [*residual, *slopes, *taken(self.value)], taken(*[e for p in self.others for e in p]),
                         taken(self.size), _cramer(last_slopes, [-e for e in right]),
@@ -123,23 +123,23 @@ class Touching(UserFunction):
     given = False
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        found, _ = symdyn_each(lambda at: self._solved(_Doubles(), at, CLOSE), self.results, values)
-        return np.moveaxis(np.array(found), 0, -1)
+        result, _ = symdyn_each(lambda at: self._solved(_Doubles(), at, CLOSE), self.results, values)
+        return np.moveaxis(np.array(result), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        found = self._solved(Lenient.of(context), values, context.sqrt(context.eps))
-        return [context.nan] * self.results if found is None else list(found)
+        result = self._solved(Lenient.of(context), values, context.sqrt(context.eps))
+        return [context.nan] * self.results if result is None else list(result)
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         r = self.implicit.recorded
         known = dict(zip((*r.leaves, *r.changes), (*results, *values, *changes), strict=True))
         return _walked(Again(recorder), r.tangents, known)
 
-    def slope(self, place: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
+    def slope(self, index: int, k: int, arguments: Sequence[sp.Expr]) -> sp.Expr:
         i = self.implicit
         at = dict(zip((*i.unknowns, *i.known), (*self.applied(arguments), *arguments), strict=True))
-        found = _cramer([e.diff(s) for e in i.last for s in i.unknowns], [-e.diff(i.known[k]) for e in i.last])[place]
-        return found.xreplace(at)
+        result = _cramer([e.diff(s) for e in i.last for s in i.unknowns], [-e.diff(i.known[k]) for e in i.last])[index]
+        return result.xreplace(at)
 
     def _solved(self, numbers: Arithmetic, values: Sequence[Any], close: Any) -> Any:
         r, n = self.implicit.recorded, self.results
@@ -238,10 +238,10 @@ def touching_point(equations: Any, others: Any, nearest: Any, s: Any, size: Any,
         if best is not None and not lowest[n] < best[1] - 1e-9 * size:
             last = best if nearest is None else touching_from(nearest, best[0], size, close)
             return None if last is None else last[0]
-        found = touching_from(equations, lowest[:n], size, close)
-        if found is None or (best is not None and not found[1] < best[1]):
+        result = touching_from(equations, lowest[:n], size, close)
+        if result is None or (best is not None and not result[1] < best[1]):
             return None
-        best = found
+        best = result
     return None
 
 
@@ -265,12 +265,13 @@ class _Lines(Arithmetic):
         return results[node.args[1]]
 
     def call(self, node: Node, args: list[str]) -> list[str]:
-        kernel = node.args[0]
-        if not isinstance(kernel, Spline):
-            raise UnsupportedExpression(f"the height calls {getattr(kernel, 'signature', kernel.name)}, which a round shape does "
-                                        "not go with; pass a Point, or the height as an expression or a spline")
-        n = len(kernel.degrees)
-        return [self.assigned(self.spline(kernel, args[:n], [str(int(float(order))) for order in args[n:]]))]
+        intrinsic = node.args[0]
+        if not isinstance(intrinsic, Spline):
+            called = getattr(intrinsic, "signature", intrinsic.name)
+            raise UnsupportedExpression(f"the height calls {called}, which a round shape does not "
+                                        "go with; pass a Point, or the height as an expression or a spline")
+        n = len(intrinsic.degrees)
+        return [self.assigned(self.spline(intrinsic, args[:n], [str(int(float(order))) for order in args[n:]]))]
 
     def assigned(self, text: str) -> str:
         name = f"w{len(self.lines)}"

@@ -5,9 +5,9 @@ from symdyn.model.elements.base import Element
 from symdyn.model.elements.buoyancy import Box, Buoyancy
 from symdyn.model.elements.linear import LinearDamping, LinearStiffness
 from symdyn.model.elements.mooring import MooringLine
-from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.model.elements.waves import WaveExcitation
 from symdyn.model.elements.wind import Drag, Thrust
 
 __all__ = ["Action", "AddedMass", "Box", "Buoyancy", "Drag", "Element", "LinearDamping", "LinearStiffness",
-           "MooringLine", "Site", "Thrust", "Watch", "WaveExcitation"]
+           "MooringLine", "Site", "Thrust", "Validity", "WaveExcitation"]

@@ -13,7 +13,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.elements.base import Element
-from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.cube import Cube
@@ -104,9 +104,9 @@ class Buoyancy(Element):
             V = V + volume * wet[0]
             S = S + volume * (wet[0] * center + size * wet[1:])
         V = a.name(f"displaced_{self.label}", V)
-        label, part, found = f"immersed part of {self.where}", V / whole, "the immersed part of its volume is {value}"
-        watches = (Watch(label, part, LEAST, math.inf, f"{self.where}: the box has left the water: {found}"),
-                   Watch(label, part, -math.inf, 1 - LEAST, f"{self.where}: it is under water altogether: it sinks: {found}"))
+        label, part, result = f"immersed part of {self.where}", V / whole, "the immersed part of its volume is {value}"
+        watches = (Validity(label, part, LEAST, math.inf, f"{self.where}: the box has left the water: {result}"),
+                   Validity(label, part, -math.inf, 1 - LEAST, f"{self.where}: it is under water altogether: it sinks: {result}"))
         return Action(elastic=(weight * V * up, weight * cross(S, up)), potential=-weight * (dot(up, S) + height * V),
                       watches=watches)
 

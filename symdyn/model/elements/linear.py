@@ -12,7 +12,7 @@ import sympy as sp
 
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import least_eigenvalue, six
-from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, inner, vector
 
@@ -107,20 +107,20 @@ class LinearStiffness(Element):
         n = about_vector(site, Q[3:]) if turned else about_angles(site, Q[3:], self.where)
         return f, n + cross(point, f)
 
-    def _tilt(self, site: Site) -> Watch:
+    def _tilt(self, site: Site) -> Validity:
         a, R = site.algebra, site.R
         level = a.sqrt(R[2, 0] * R[2, 0] + R[2, 1] * R[2, 1])
         tilt = a.recorder.apply("atan2", level, R[2, 2]) * 180 / a.recorder.pi()
-        return Watch(f"tilt of {self.where}", tilt, -1.0, TILT,
-                     f"{self.where}: the body tilts by {{value}} degrees; a linear stiffness is meant for small angles, up to "
-                     f"{TILT:g} degrees")
+        return Validity(f"tilt of {self.where}", tilt, -1.0, TILT,
+                        f"{self.where}: the body tilts by {{value}} degrees; a linear stiffness is meant for small angles, up to "
+                        f"{TILT:g} degrees")
 
-    def _turn(self, site: Site) -> Watch:
+    def _turn(self, site: Site) -> Validity:
         """Of a potential that is alike on both sides of half a turn the energy decides nothing."""
         a, r = site.algebra, site.rotation_vector
-        return Watch(f"turn of {self.where}", a.sqrt(dot(r, r)) * 180 / a.recorder.pi(), -1.0, TURN,
-                     f"{self.where}: the body has turned by {{value}} degrees; at half a turn its angles jump, and the moments "
-                     "with them")
+        return Validity(f"turn of {self.where}", a.sqrt(dot(r, r)) * 180 / a.recorder.pi(), -1.0, TURN,
+                        f"{self.where}: the body has turned by {{value}} degrees; at half a turn its angles jump, and the "
+                        "moments with them")
 
 
 def about_angles(site: Site, Q: np.ndarray, where: str) -> np.ndarray:

@@ -9,7 +9,7 @@ import sympy as sp
 
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import not_negative, positive
-from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, vector
 from symdyn.tape.catenary import NEAREST, Catenary, potential
@@ -91,9 +91,9 @@ class MooringLine(Element):
             height = recorder.guard(height, height, f"{self.where}: the fairlead is not above the seabed, on which the anchor "
                                     "stands; move it, or pass seabed=False")
         values = [distance / length, height / length, weight * length / stiffness, friction]
-        kernel = Catenary((int(self.seabed),), f"{self.where}: no shape at rest was found; look at its length, weight, stiffness "
-                          "and friction and at the place of the fairlead: some of them is negative or not finite")
-        h, v = recorder.call(kernel, values)
+        intrinsic = Catenary((int(self.seabed),), f"{self.where}: no shape at rest was found; look at its length, weight, "
+                             "stiffness and friction and at the place of the fairlead: some of them is negative or not finite")
+        h, v = recorder.call(intrinsic, values)
         total = weight * length
         pull = total * h / distance
         f = -(site.R.T @ vector(pull * d[0], pull * d[1], total * v))
@@ -104,8 +104,8 @@ class MooringLine(Element):
         return Action(elastic=wrench, potential=total * length * potential(recorder, self.seabed, (h, v), values),
                       watches=watches)
 
-    def _strain(self, site: Site, strain: Any) -> Watch:
+    def _strain(self, site: Site, strain: Any) -> Validity:
         unit = "" if symbols_of(self.stiffness) else f" of {float(self.stiffness):.4g} N"
-        return Watch(f"strain of {self.where}", strain, -1.0, STRAIN,
-                     f"{self.where}: it is stretched by {{value}} of its length, with that part of EA{unit} as its tension; "
-                     f"lines are meant up to {STRAIN:g}; look at its length, its stiffness and its places")
+        return Validity(f"strain of {self.where}", strain, -1.0, STRAIN,
+                        f"{self.where}: it is stretched by {{value}} of its length, with that part of EA{unit} as its tension; "
+                        f"lines are meant up to {STRAIN:g}; look at its length, its stiffness and its places")

@@ -52,7 +52,7 @@ class Site(Protocol):
 
 
 @dataclass(frozen=True)
-class Watch:
+class Validity:
     """A value that is looked at after a simulation and in statics.
 
     message   what it means if the value is below `least` or above `most`; {value} stands for the number found
@@ -82,4 +82,4 @@ class Action:
     elastic: Wrench = field(default_factory=nothing)
     other: Wrench = field(default_factory=nothing)
     potential: Any = 0
-    watches: tuple[Watch, ...] = ()
+    watches: tuple[Validity, ...] = ()

@@ -172,9 +172,9 @@ class Joint:
         length = numeric(sp.sqrt(axis.dot(axis)))
         numbers = all(e.is_number for e in entries)
         if length < 1e-12 or (not numbers and abs(length - 1) > 1e-9):
-            found = f"has length {length:.6g}" + ("" if numbers else " for arbitrary numbers")
+            result = f"has length {length:.6g}" + ("" if numbers else " for arbitrary numbers")
             cure = "pass a direction that is not zero" if length < 1e-12 else "divide it by its length"
-            self.faults.append(f"joint {shown(self.name)}: {what} {list(axis)} {found}, not 1; {cure}")
+            self.faults.append(f"joint {shown(self.name)}: {what} {list(axis)} {result}, not 1; {cure}")
             return harmless
         return _exactly_unit(axis) if abs(length - 1) <= 1e-9 else _divided_by_its_length(axis)
 

@@ -56,7 +56,7 @@ class Custom(Joint):
         self.position = _decimal(self.faults.vector(position, f"{where}: position", planar=True), same)
         self._take_units(units)
         if named:
-            self._refuse_foreign()
+            self._reject_foreign()
         self.transform = None if self.faults else self._differentiated()
         self.identity_at_zero = self.transform is not None and self.transform.identity_at_zero
 
@@ -98,7 +98,7 @@ class Custom(Joint):
             return
         self.coordinate_units = given
 
-    def _refuse_foreign(self) -> None:
+    def _reject_foreign(self) -> None:
         for what, matrix in (("rotation", self.rotation), ("position", self.position)):
             foreign = sorted(str(s) for s in symbols_of(matrix) if s not in self.coordinates and not _is_parameter(s))
             if foreign:

@@ -60,10 +60,10 @@ class Samples:
         """
         if expression.is_number or not self.points or not _meromorphic(expression):
             return expression
-        found = self.values([expression])
-        if any(v is None for v in found):
+        result = self.values([expression])
+        if any(v is None for v in result):
             return expression
-        values = [v[0] for v in found if v is not None]
+        values = [v[0] for v in result if v is not None]
         short = Fraction(str(values[0])).limit_denominator(1000)
         with mpmath.workdps(DIGITS):
             near = all(abs(v - mpmath.mpf(short.numerator) / short.denominator) < mpmath.mpf(10) ** (10 - DIGITS)

@@ -19,7 +19,7 @@ from symdyn.runtime.batches.on_device import on_device
 from symdyn.runtime.batches.precision import checked_precision
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
 from symdyn.runtime.batches.starts import projects
-from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
+from symdyn.runtime.batches.states import LIBRARY, input_rows, parameter_rows, tables_of, width
 from symdyn.runtime.batches.together import LISTED, Asked, Together, warn
 from symdyn.runtime.batches.validity import outside
 from symdyn.runtime.gpu.device import device_number
@@ -161,14 +161,14 @@ def _why_these(along: Inputs | None, options: Mapping[str, Any]) -> str:
 
 def unit_of(method: str, looks: bool) -> str | RightSide:
     """What the code of motions in lanes is made for; looks: for events."""
-    return UNIT if method == METHOD and not looks else RightSide(method=method, lanes=True, looks=looks)
+    return LIBRARY if method == METHOD and not looks else RightSide(method=method, lanes=True, looks=looks)
 
 
 def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
-    unit: Any = module.unit(unit_of(method, asked.looks))
+    library: Any = module.library(unit_of(method, asked.looks))
     together = Together(module, asked)
     n = asked.n
-    size = unit.function("batch_size")
+    size = library.function("batch_size")
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
@@ -180,23 +180,25 @@ def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.n
         breaks, coefficients = (np.ascontiguousarray(a) for a in (pieces.breaks, pieces.coefficients))
         problem.n_pieces, problem.breaks, problem.pieces = len(coefficients), breaks.ctypes.data, coefficients.ctypes.data
     tables = tables_of([together.starts, asked.inputs, together.params, together.lengths])
-    go = unit.function("batch_go")
+    go = library.function("batch_go")
     go.restype = ctypes.c_long
     interrupted, done, waited = False, 0, 0
     doubtful = bool(module.metadata.switches) or projects(module) or asked.looks
     try:
         if module.metadata.inputs:
-            unit.function("batch_inputs")(batch, ctypes.byref(problem))
+            library.function("batch_inputs")(batch, ctypes.byref(problem))
         if asked.looks:
-            unit.function("batch_look")(batch, ctypes.c_void_p(together.look.ctypes.data), ctypes.c_double(asked.event_spacing),
-                                        ctypes.c_long(together.taken_after), ctypes.c_void_p(together.doubts.ctypes.data))
-        unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
-                                     ctypes.c_void_p(together.reports.ctypes.data))
+            library.function("batch_look")(batch, ctypes.c_void_p(together.look.ctypes.data),
+                                           ctypes.c_double(asked.event_spacing), ctypes.c_long(together.taken_after),
+                                           ctypes.c_void_p(together.doubts.ctypes.data))
+        library.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
+                                        ctypes.c_void_p(together.reports.ctypes.data))
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (doubtful and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
-    return together.solution(unit, width(module), "" if width(module) > 1 else NO_VECTORS, interrupted, PATIENCE * PIECE, alone)
+    note = "" if width(module) > 1 else NO_VECTORS
+    return together.solution(library, width(module), note, interrupted, PATIENCE * PIECE, alone)
 
 
 def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any, options: Mapping[str, Any]) -> BatchSolution:

@@ -40,9 +40,9 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
         _demand_single(module, method, asked)
     device = devices.open_device(number, module.name)
     try:
-        unit: Any = module.unit(RightSide(method=method, threads=True, looks=asked.looks,
+        library: Any = module.library(RightSide(method=method, threads=True, looks=asked.looks,
                                              single=precision == "single"))
-        kernel = device_kernel(module, device, unit.source, f"{unit.metadata.name}_motions")
+        kernel = device_kernel(module, device, library.source, f"{library.metadata.name}_motions")
         motions = Together(module, asked)
         work = Work(motions.starts, asked.inputs, motions.params, motions.lengths, motions.span, asked.atol, asked.times,
                     projects(module), motions.pieces, motions.stops, motions.look, asked.event_spacing, motions.taken_after,
@@ -53,7 +53,7 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
         except KeyboardInterrupt:
             interrupted = True
         _take(motions, work)
-        return motions.solution(unit, device.at_once(kernel), note, interrupted, MOST_STEPS, alone)
+        return motions.solution(library, device.at_once(kernel), note, interrupted, MOST_STEPS, alone)
     finally:
         device.close()
 

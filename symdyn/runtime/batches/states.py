@@ -22,7 +22,7 @@ from symdyn.shown import shown
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-UNIT = "rhs_batch"
+LIBRARY = "rhs_batch"
 # Of so many rows a warning says the numbers.
 LISTED = 8
 
@@ -41,8 +41,8 @@ def tables_of(arrays: list[np.ndarray]) -> Any:
 
 def width(module: Module) -> int:
     """How many states are computed at once on one processor core."""
-    unit: Any = module.unit(UNIT) if module.backend == "c" else None
-    return 1 if unit is None else int(unit.function("batch_width")())
+    library: Any = module.library(LIBRARY) if module.backend == "c" else None
+    return 1 if library is None else int(library.function("batch_width")())
 
 
 def parameter_rows(module: Module, params: Any) -> np.ndarray:
@@ -123,19 +123,19 @@ def _result(module: Module, states: np.ndarray, shape: tuple[int, int], out: np.
 
 def _on_vectors(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray) -> dict[int, str]:
     """Fill xd; returns why, for rows that fail."""
-    unit: Any = module.unit(UNIT)
+    library: Any = module.library(LIBRARY)
     codes = np.zeros(n, dtype=np.intc)
     steps = (ctypes.c_long * 2)(*[s // xd.itemsize for s in xd.strides])
-    call = unit.function("rhs_batch")
+    call = library.function("rhs_batch")
     call.restype = ctypes.c_long
     tables = tables_of([arrays[k] for k in ("t", "x", "inputs", "params")])
     failed = call(ctypes.c_long(n), tables, ctypes.c_void_p(xd.ctypes.data), steps, ctypes.c_void_p(codes.ctypes.data))
-    return {int(k): unit.reason(int(codes[k])) for k in np.flatnonzero(codes)} if failed else {}
+    return {int(k): library.reason(int(codes[k])) for k in np.flatnonzero(codes)} if failed else {}
 
 
 def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray) -> dict[int, str]:
     """The same with NumPy: all at once, without the rows that turn out to fail."""
-    unit: Any = module.unit("rhs")
+    library: Any = module.library("rhs")
     t, x, inputs, p = (np.broadcast_to(arrays[k], (n, arrays[k].shape[1])) for k in ("t", "x", "inputs", "params"))
     reasons: dict[int, str] = {}
     xd[:] = np.nan
@@ -143,14 +143,14 @@ def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.
     while len(left):
         rows: Any = left if len(left) < n else slice(None)
         try:
-            xd[rows] = unit.broadcast("rhs", t[rows, 0], x[rows], p[rows], inputs[rows])
+            xd[rows] = library.broadcast("rhs", t[rows, 0], x[rows], p[rows], inputs[rows])
             break
-        except unit.module.SingularError as error:
+        except library.module.SingularError as error:
             failed = np.broadcast_to(error.states, len(left))
             reasons |= dict.fromkeys(left[failed].tolist(), str(error))
             left = left[~failed]
         except (ArithmeticError, ValueError):  # of a function of the user, say, which does not tell the rows
-            reasons |= _one_by_one(unit, left, (t, x, inputs, p), xd)
+            reasons |= _one_by_one(library, left, (t, x, inputs, p), xd)
             break
     for k in np.flatnonzero(~np.isfinite(xd).all(axis=1)).tolist():
         reasons.setdefault(k, "the result is not finite")
@@ -158,13 +158,13 @@ def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.
     return dict(sorted(reasons.items()))
 
 
-def _one_by_one(unit: Any, rows: np.ndarray, arguments: tuple[np.ndarray, ...], xd: np.ndarray) -> dict[int, str]:
+def _one_by_one(library: Any, rows: np.ndarray, arguments: tuple[np.ndarray, ...], xd: np.ndarray) -> dict[int, str]:
     """Fill these rows of xd; returns why, for those that fail."""
     reasons = {}
     for k in rows.tolist():
         t, x, inputs, p = (a[k] for a in arguments)
         try:
-            xd[k] = unit.evaluate("rhs", float(t[0]), x, tuple(p.tolist()), inputs)
+            xd[k] = library.evaluate("rhs", float(t[0]), x, tuple(p.tolist()), inputs)
         except (ArithmeticError, ValueError) as error:
             reasons[k] = str(error)
     return reasons

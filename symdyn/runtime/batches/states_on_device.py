@@ -40,20 +40,20 @@ def states_on_device(module: Module, number: int, values: Mapping[str, Any], out
     try:
         there = {g: values[g] for g in GROUPS if is_on(values[g], *device.where)}
         given_out = is_on(out, *device.where)
-        kernels, unit = _kernels(module, device, precision)
+        kernels, library = _kernels(module, device, precision)
         if "x" not in there:
             if there or given_out:
                 raise ArgumentError(f"{module.name}: {', '.join([*there, *['out'] * given_out])} lie on the device and x does "
                                     "not; give all as arrays of NumPy, or x there, too")
             n, arrays = take(values)
             xd = result(arrays["x"], n)
-            return xd, _reasons(unit, rates(device, kernels, n, arrays, xd, module.name)), n, arrays["x"]
-        return _there(module, device, kernels, unit, values, there, out, take)
+            return xd, _reasons(library, rates(device, kernels, n, arrays, xd, module.name)), n, arrays["x"]
+        return _there(module, device, kernels, library, values, there, out, take)
     finally:
         device.close()
 
 
-def _there(module: Module, device: Device, kernels: Kernels, unit: Any, values: Mapping[str, Any], there: Mapping[str, Any],
+def _there(module: Module, device: Device, kernels: Kernels, library: Any, values: Mapping[str, Any], there: Mapping[str, Any],
            out: Any, take: Taken) -> tuple[Any, dict[int, str], int, np.ndarray]:
     name, sizes = module.name, module.metadata.sizes
     handle = device.handle(device.stream())
@@ -62,8 +62,8 @@ def _there(module: Module, device: Device, kernels: Kernels, unit: Any, values: 
     if "t" in views and len(views["t"].shape) == 1:
         t = views["t"]
         views["t"] = View(t.address, (*t.shape, 1), (*t.strides, 1), t.kept)
-    for group, found in views.items():
-        demand_rows(found, widths[group], name, group)
+    for group, result in views.items():
+        demand_rows(result, widths[group], name, group)
     # What is here is taken with a state in the place of those that are there.
     rows, arrays = take({g: np.zeros((1, widths[g])) if g in ("x", "inputs", "params") and g in there else
                          0.0 if g in there else values[g] for g in GROUPS})
@@ -89,14 +89,14 @@ def _there(module: Module, device: Device, kernels: Kernels, unit: Any, values: 
             raise ArgumentError(f"{name}: out and {', '.join(shared)} share memory on the device, where it would be read after "
                                 "it was written; give another array, or x itself")
     made, codes = rates_there(device, kernels, n, {g: views.get(g, arrays[g]) for g in GROUPS}, to, name)
-    return out if made is None else made, _reasons(unit, codes), n, np.zeros((0, sizes.x))
+    return out if made is None else made, _reasons(library, codes), n, np.zeros((0, sizes.x))
 
 
 def _kernels(module: Module, device: Device, precision: str) -> tuple[Kernels, Any]:
-    unit: Any = module.unit(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
-    own, metadata = unit.metadata.name, unit.metadata
-    constants, states = (device_kernel(module, device, unit.source, f"{own}_{what}") for what in ("constants", "states"))
-    return Kernels(constants, states, np.dtype(PRECISIONS[precision]), metadata.sizes.x, metadata.n_c), unit
+    library: Any = module.library(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
+    own, metadata = library.metadata.name, library.metadata
+    constants, states = (device_kernel(module, device, library.source, f"{own}_{what}") for what in ("constants", "states"))
+    return Kernels(constants, states, np.dtype(PRECISIONS[precision]), metadata.sizes.x, metadata.n_c), library
 
 
 def device_kernel(module: Module, device: Device, text: str, function: str) -> Any:
@@ -112,8 +112,8 @@ def device_kernel(module: Module, device: Device, text: str, function: str) -> A
                            "CUDA C as well: without #include, and with nothing but the math library") from None
 
 
-def _reasons(unit: Any, codes: np.ndarray) -> dict[int, str]:
-    return {int(k): unit.reason(int(codes[k])) for k in np.flatnonzero(codes)}
+def _reasons(library: Any, codes: np.ndarray) -> dict[int, str]:
+    return {int(k): library.reason(int(codes[k])) for k in np.flatnonzero(codes)}
 
 
 __all__ = ["DeviceArray", "device_kernel", "states_on_device"]

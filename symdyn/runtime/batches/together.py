@@ -88,7 +88,7 @@ class Together:
         """Attempted steps after which a run of its own takes its events."""
         return STEPS if self.module.metadata.switches else PIECE
 
-    def solution(self, unit: Any, width: int, note: str, interrupted: bool, limit: int,
+    def solution(self, library: Any, width: int, note: str, interrupted: bool, limit: int,
                  alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
         """What has come of them; those that took more than `limit` steps, or left their constraints, are integrated alone.
 
@@ -97,7 +97,8 @@ class Together:
         module, reports, x, n = self.module, self.reports, self.x, self.asked.n
         success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
         late = reports["status"] == STATUS.STEP_LIMIT
-        messages = {k: self.wrong.get(k) or _message(unit, reports[k], self.states[k]) for k in np.flatnonzero(~success).tolist()}
+        messages = {k: self.wrong.get(k) or _message(library, reports[k], self.states[k])
+                    for k in np.flatnonzero(~success).tolist()}
         if late.any() and not interrupted:
             why = ("the right-hand side jumps, so that they may chatter" if module.metadata.switches else
                    "their steps may have become too short")
@@ -149,11 +150,11 @@ def _counts(reports: np.ndarray) -> np.ndarray:
     return np.column_stack([reports["n_steps"], reports["n_rejected"]])
 
 
-def _message(unit: Any, row: np.ndarray, states: np.ndarray) -> str:
-    of, metadata = RunReport.from_buffer_copy(row.tobytes()), unit.metadata
+def _message(library: Any, row: np.ndarray, states: np.ndarray) -> str:
+    of, metadata = RunReport.from_buffer_copy(row.tobytes()), library.metadata
     if of.status == STATUS.STEP_LIMIT:
         return f"{metadata.name}: not finished"
-    reason, bad = unit.reason(of.reason), of.bad_index
+    reason, bad = library.reason(of.reason), of.bad_index
     if of.status == STATUS.NO_CONSTANTS:
         return f"{metadata.name}: {reason}; check the parameters"
     failed = of.status in (STATUS.FIELD_FAILED, STATUS.STATE_NOT_FINITE)

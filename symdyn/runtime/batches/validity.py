@@ -33,9 +33,9 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
             given = inputs[group].reshape(-1, inputs.shape[2])[there]
         else:
             given = np.repeat(np.broadcast_to(inputs, (len(x), inputs.shape[1]))[group], len(t), axis=0)[there]
-        found = np.full((len(states), len(about)), np.nan)
-        found[there] = _rows(module, times[there], states[there], p, given)
-        values[group] = found.reshape(*x[group].shape[:2], -1)
+        result = np.full((len(states), len(about)), np.nan)
+        result[there] = _rows(module, times[there], states[there], p, given)
+        values[group] = result.reshape(*x[group].shape[:2], -1)
     messages = []
     for (label, least, most, message, summed), column in zip(about, np.moveaxis(values, -1, 0), strict=True):
         if summed:
@@ -51,12 +51,12 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
 
 def _rows(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """The function `watches`, (n, n_w); NaN where it cannot be evaluated."""
-    found = np.full((len(x), len(module.metadata.watches)), np.nan)
+    result = np.full((len(x), len(module.metadata.watches)), np.nan)
     try:
         if len(x):
-            found[:] = module.evaluate(WATCHES, t, x, params, inputs).reshape(found.shape)
+            result[:] = module.evaluate(WATCHES, t, x, params, inputs).reshape(result.shape)
     except EvaluationError:
         for k in range(len(x)):
             with contextlib.suppress(EvaluationError):
-                found[k] = module.evaluate(WATCHES, t[k], x[k], params, inputs[k]).ravel()
-    return found
+                result[k] = module.evaluate(WATCHES, t[k], x[k], params, inputs[k]).ravel()
+    return result

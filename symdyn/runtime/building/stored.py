@@ -75,11 +75,11 @@ def writers(path: Path) -> str:
     """
     if os.name != "posix":
         return ""
-    found = path.stat()
-    if found.st_uid not in (0, os.geteuid()):
-        return f"it belongs to the user with the number {found.st_uid}"
-    who = [name for bit, name in ((0o020, "its group"), (0o002, "everyone")) if found.st_mode & bit]
-    return f"its mode {found.st_mode & 0o7777:04o} lets {' and '.join(who)} write to it" if who else ""
+    result = path.stat()
+    if result.st_uid not in (0, os.geteuid()):
+        return f"it belongs to the user with the number {result.st_uid}"
+    who = [name for bit, name in ((0o020, "its group"), (0o002, "everyone")) if result.st_mode & bit]
+    return f"its mode {result.st_mode & 0o7777:04o} lets {' and '.join(who)} write to it" if who else ""
 
 
 def import_text(source: str, path: Path) -> ModuleType:

@@ -9,7 +9,7 @@ from symdyn.backend.metadata import Metadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.functions.table import BATCH, seldom_called
 from symdyn.runtime.building.compiler import plain, require_compiler
-from symdyn.runtime.building.library import KernelUnit, Unit, loaded
+from symdyn.runtime.building.library import DeviceText, Library, loaded
 
 
 class Texts:
@@ -34,11 +34,11 @@ class Texts:
         """The text that has it."""
         return self._made[self._key(what)][0]
 
-    def load(self, what: str | RightSide) -> Unit:
+    def load(self, what: str | RightSide) -> Library:
         """The library that has it. Raises KeyError where no text does, and what compiling raises."""
         text, metadata = self._made[self._key(what)]
         if isinstance(what, RightSide) and what.threads:
-            return KernelUnit(text, metadata)
+            return DeviceText(text, metadata)
         compiler = require_compiler() if self.backend == "c" else None
         if compiler is not None and isinstance(what, str) and seldom_called(what):
             compiler = plain(compiler)

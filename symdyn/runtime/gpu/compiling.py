@@ -82,6 +82,6 @@ def _compiled(text: str, name: str, architecture: str, form: str, *more: str) ->
 def _taken(size: Any, get: Any, program: Any) -> bytes:
     """What two functions of the compiler give: a length, then so many bytes."""
     _, length = size(program)
-    found = b" " * length  # the compiler writes into it
-    get(program, found)
-    return found
+    result = b" " * length  # the compiler writes into it
+    get(program, result)
+    return result

@@ -173,7 +173,7 @@ class DeviceArray:
         self._release()
 
 
-def demand_rows(found: View, width: int, owner: str, what: str) -> None:
+def demand_rows(result: View, width: int, owner: str, what: str) -> None:
     """Raises ArgumentError where an array on the device has not as many columns."""
-    if len(found.shape) != 2 or found.shape[1] != width:
-        raise ArgumentError(f"{owner}: {what} has the shape {shown(found.shape)} on the device, needed is (n, {width})")
+    if len(result.shape) != 2 or result.shape[1] != width:
+        raise ArgumentError(f"{owner}: {what} has the shape {shown(result.shape)} on the device, needed is (n, {width})")

@@ -130,8 +130,8 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
                        [allocated(size * a[:1].nbytes) for a in work.results],
                        allocated(len(work.given) * ctypes.sizeof(Table)), allocated(ctypes.sizeof(ctypes.c_int)))
                  for _ in range(min(SLOTS, -(-n // size)))]
-        for place, values in zip(places, fixed, strict=True):
-            device.upload(slots[0].stream, place, values)
+        for index, values in zip(places, fixed, strict=True):
+            device.upload(slots[0].stream, index, values)
         device.wait(slots[0].stream)  # the other stream would not
         in_turns(parts_of(n, size), slots, lambda slot, rows: _begin(device, kernel, work, slot, places, rows, threads),
                  lambda slot: _collect(device, work, slot))

@@ -113,11 +113,11 @@ def rates(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, np.ndar
             if slot.rows is None:
                 return
             part, slot.rows = slice(slot.rows.start, slot.rows.stop), None
-            found = np.empty((kernels.n_x, part.stop - part.start), dtype=kernels.dtype)
-            device.download(slot.stream, found, slot.out)
+            result = np.empty((kernels.n_x, part.stop - part.start), dtype=kernels.dtype)
+            device.download(slot.stream, result, slot.out)
             device.download(slot.stream, codes[part], slot.codes)
             device.wait(slot.stream)
-            xd[part] = found.T
+            xd[part] = result.T
 
         in_turns(parts_of(n, size), slots, begin, collect)
     finally:
@@ -171,11 +171,11 @@ def rates_there(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, n
 
 def _array(device: Device, address: int, shape: tuple[int, int], dtype: np.dtype) -> DeviceArray:
     def fetch() -> np.ndarray:
-        found, stream = np.empty(shape[::-1], dtype=dtype), device.stream()
-        device.download(stream, found, address)
+        result, stream = np.empty(shape[::-1], dtype=dtype), device.stream()
+        device.download(stream, result, address)
         device.wait(stream)
         device.close()
-        return found.T
+        return result.T
 
     return DeviceArray(address, shape, dtype, device.where, lambda: device.release(address), fetch, True)
 

@@ -101,7 +101,7 @@ class Motions:
         return values
 
 
-def take_motion(given: Any, name: str, place: int, owner: str, span: tuple[float, float] | None, smooth: bool) -> Followed:
+def take_motion(given: Any, name: str, index: int, owner: str, span: tuple[float, float] | None, smooth: bool) -> Followed:
     """A motion as the user gave it: a function of t that returns value, rate and acceleration, a spline of SciPy, or a table,
     which becomes a cubic spline.
 
@@ -113,17 +113,17 @@ def take_motion(given: Any, name: str, place: int, owner: str, span: tuple[float
     where = f"{owner}: inputs: the motion {name}"
     spline = _spline(given, where)
     if spline is not None:
-        return _of_spline(spline, name, place, where, span)
+        return _of_spline(spline, name, index, where, span)
     if hasattr(given, "derivative"):  # a spline of another kind, such as scipy.interpolate.UnivariateSpline
         knots = given.get_knots() if hasattr(given, "get_knots") else ()
-        return Followed(name, place, None, _with_derivatives(deepcopy(given)), tuple(map(float, knots)))
+        return Followed(name, index, None, _with_derivatives(deepcopy(given)), tuple(map(float, knots)))
     if not callable(given):
         raise ArgumentError(f"{where} is {shown(given)}; pass a function of t that returns value, rate and acceleration, a "
                             "spline of SciPy, a table (times, values), or a number to hold it")
     if not _takes_time_alone(given):
         raise ArgumentError(f"{where} is a function of more than t; a motion depends on the time alone: pass a function of t "
                             "that returns value, rate and acceleration")
-    motion = Followed(name, place, None, given, (), smooth)
+    motion = Followed(name, index, None, given, (), smooth)
     if span is not None:
         _demand_motion(motion, where, span)
     return motion
@@ -191,17 +191,17 @@ def _powers(c: np.ndarray) -> np.ndarray:
     return powers
 
 
-def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float, float] | None) -> Followed:
+def _of_spline(spline: Any, name: str, index: int, where: str, span: tuple[float, float] | None) -> Followed:
     breaks, c = _sound(spline, where, span)
     _demand_continuous(breaks, c, where)
     if len(c) > ORDER or spline.extrapolate == "periodic":
-        return Followed(name, place, None, _with_derivatives(deepcopy(spline)),
+        return Followed(name, index, None, _with_derivatives(deepcopy(spline)),
                         _repeated(breaks, span) if spline.extrapolate == "periodic" else tuple(breaks.tolist()))
     c0, c1, c2, c3 = _powers(c)
     none = np.zeros_like(c0)
     rows = [np.stack(r, axis=-1) for r in ((c0, c1, c2, c3), (c1, 2 * c2, 3 * c3, none), (2 * c2, 6 * c3, none, none))]
     pieces = Pieces(breaks, np.stack(rows, axis=1))
-    return Followed(name, place, pieces, None, tuple(breaks.tolist()))
+    return Followed(name, index, pieces, None, tuple(breaks.tolist()))
 
 
 def _with_derivatives(spline: Any) -> Callable[[float], Any]:
@@ -270,10 +270,10 @@ def _demand_derivatives(motion: Followed, where: str, instants: np.ndarray, rows
     for h in (sign * step * length for step in STEPS for sign in (1, -1)):
         away = np.array([motion.at(float(t + h)) for t in instants])
         # A step of Euler, half of it with the next derivative, which the rates know of themselves.
-        found = (away - rows)[:, :2] / h - np.column_stack([(away - rows)[:, 1] / 2, np.zeros(len(rows))])
+        result = (away - rows)[:, :2] / h - np.column_stack([(away - rows)[:, 1] / 2, np.zeros(len(rows))])
         rounding = 4 * np.finfo(float).eps * np.abs(rows[:, :2]) / abs(h)
-        miss = np.maximum(np.abs(found - rows[:, 1:]) - rounding, 0.0)
-        rates = np.where(miss < misses, found, rates)
+        miss = np.maximum(np.abs(result - rows[:, 1:]) - rounding, 0.0)
+        rates = np.where(miss < misses, result, rates)
         misses = np.minimum(misses, miss)
     wrong = misses > MISMATCH * np.maximum(size, np.abs(rates).max(axis=0))
     for k, (what, of) in enumerate((("rate", "value"), ("acceleration", "rate"))):

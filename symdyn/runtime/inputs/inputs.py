@@ -74,10 +74,10 @@ class Mixed:
 
     def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
         values = self.constant.copy() if self.pieces is None else self.pieces.at(t)
-        for place, name, function in self.functions:
+        for index, name, function in self.functions:
             value = function(t, x)
             try:
-                values[place] = number(value)
+                values[index] = number(value)
             except NotReal as error:
                 raise ArgumentError(f"the function of input {name} returned {shown(value)} at t = {t:.6g}; needed is a "
                                     f"number: {error}") from None
@@ -112,7 +112,7 @@ class Inputs:
     def slopes(self, t: float, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Derivatives of the inputs along columns (k, n_x) of sensitivities, (n_in, k), by the gradients of functions. Raises
         InputRaised from what these raise, ArgumentError for what does not fit."""
-        found = np.zeros((len(self.constant), len(columns)))
+        result = np.zeros((len(self.constant), len(columns)))
         for places, gradient, what in self.gradients:
             given = called(gradient, t, x, what, (t, x.copy()))
             try:
@@ -122,8 +122,8 @@ class Inputs:
                                     "inputs") from None
             if np.isfinite(x).all() and not np.isfinite(rows).all():
                 raise InputRaised(f"{what} is {rows[~np.isfinite(rows)][0]:g} at t = {t:.6g}", t, x)
-            found[list(places)] = rows @ columns.T
-        return found
+            result[list(places)] = rows @ columns.T
+        return result
 
     def demand_true_slopes(self, t: float, x: np.ndarray) -> None:
         """Raises ArgumentError where the gradient of a function contradicts it, or is not finite, at a time and state (n_x,)."""
@@ -182,7 +182,7 @@ class Inputs:
     @property
     def places(self) -> list[int]:
         """Of the inputs that controllers set."""
-        return sorted({place for sampler in self.samplers for place in sampler.places} if self.record is None
+        return sorted({index for sampler in self.samplers for index in sampler.places} if self.record is None
                       else self.record.places)
 
     def held(self, values: np.ndarray | None = None) -> Inputs:
@@ -230,11 +230,11 @@ class Inputs:
         if self.function is None:
             values = self.constant[None, :] if self.pieces is None else self.pieces.at(t)
             return values if self.record is None else self.record.put(t, values)
-        found = np.full((len(t), len(self.constant)), np.nan)
+        result = np.full((len(t), len(self.constant)), np.nan)
         for k, (tk, xk) in enumerate(zip(t, x, strict=True)):
             with suppress(InputRaised):
-                found[k] = self.at(tk, xk)
-        return found
+                result[k] = self.at(tk, xk)
+        return result
 
     def stops(self, span: tuple[float, float]) -> np.ndarray:
         """Times within a span at which steps have to end, in the direction of time, (k,); those within rounding of its ends are
@@ -297,7 +297,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         demand_rest(constant, names, motions, owner)
         return Inputs(constant)
     samplers, given = _samplers(given, names, owner)
-    sampled = {names[place]: start[place] for sampler in samplers for place in sampler.places}
+    sampled = {names[index]: start[index] for sampler in samplers for index in sampler.places}
     parts = {name_of(key): value for key, value in given.items()}
     for n, value in parts.items():
         pieces = None if n in motions else spline_pieces(value, f"{owner}: inputs: {n}", span)
@@ -369,7 +369,7 @@ def demand_rest(constant: np.ndarray, names: Sequence[str], motions: Sequence[st
 def _samplers(given: Mapping[Any, Any], names: Sequence[str], owner: str) -> tuple[tuple[Sampler, ...], dict[Any, Any]]:
     """The controllers among inputs that are given by name, and the rest. Raises ArgumentError for names that there are not, or
     that come twice."""
-    found, rest, taken = [], {}, [name_of(k) for k in given if not isinstance(k, tuple)]
+    result, rest, taken = [], {}, [name_of(k) for k in given if not isinstance(k, tuple)]
     for key, value in given.items():
         keys = [name_of(k) for k in (key if isinstance(key, tuple) else (key,))]
         if not isinstance(value, Sampled):
@@ -382,11 +382,11 @@ def _samplers(given: Mapping[Any, Any], names: Sequence[str], owner: str) -> tup
         if unknown:
             raise ArgumentError(f"{owner}: inputs: there is no {', '.join(map(repr, unknown))}; there are {', '.join(names)}")
         taken += keys if isinstance(key, tuple) else []
-        found.append(Sampler(value, tuple(names.index(k) for k in keys), f"the sampled controller of {', '.join(keys)}"))
+        result.append(Sampler(value, tuple(names.index(k) for k in keys), f"the sampled controller of {', '.join(keys)}"))
     twice = sorted({k for k in taken if taken.count(k) > 1})
     if twice:
         raise ArgumentError(f"{owner}: inputs: {', '.join(twice)} given more than once")
-    return tuple(found), rest
+    return tuple(result), rest
 
 
 def is_table(value: Any) -> bool:

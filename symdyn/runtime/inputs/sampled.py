@@ -118,25 +118,25 @@ class Record:
 
     def rows(self, t: Any) -> np.ndarray:
         """The inputs at times, (..., n_in), right at the places alone; at an instant those that take effect there."""
-        found: np.ndarray = self.values[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
-        return found
+        result: np.ndarray = self.values[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
+        return result
 
     def slopes(self, t: np.ndarray) -> np.ndarray:
         """Derivatives of the inputs along columns of sensitivities at times (n,), (n, n_in, k)."""
-        found: np.ndarray = self.columns[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
-        return found
+        result: np.ndarray = self.columns[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
+        return result
 
     def put(self, t: Any, values: np.ndarray) -> np.ndarray:
         """Inputs at times with what was held in place of the values (n_in,), or (n, n_in) or (1, n_in) for (n,) times."""
         places, held = list(self.places), self.rows(t)
-        found = np.array(np.broadcast_to(values, held.shape))
-        found[..., places] = held[..., places]
-        return found
+        result = np.array(np.broadcast_to(values, held.shape))
+        result[..., places] = held[..., places]
+        return result
 
-    def of(self, place: int) -> SampleRows:
+    def of(self, index: int) -> SampleRows:
         """What was set of one input."""
-        when = self.fresh[:, place]
-        return SampleRows(self.times[when], self.values[when, place])
+        when = self.fresh[:, index]
+        return SampleRows(self.times[when], self.values[when, index])
 
 
 class Replay:
@@ -149,8 +149,8 @@ class Replay:
 
     def at(self, t: float, x: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The inputs from t on, (n_in,), and their derivatives along columns of sensitivities, (n_in, k)."""
-        place = max(int(np.searchsorted(self.record.times, t, side="right")) - 1, 0)
-        return self.record.values[place], self.record.columns[place]
+        index = max(int(np.searchsorted(self.record.times, t, side="right")) - 1, 0)
+        return self.record.values[index], self.record.columns[index]
 
     def after(self, t: float) -> float:
         """The next instant, s; infinite if there is none."""
@@ -217,7 +217,7 @@ class Sampling:
         """What was held so far."""
         return Record(np.array(self._times), np.array(self._values).reshape(-1, len(self.held)),
                       np.array(self._fresh).reshape(-1, len(self.held)),
-                      tuple(sorted({place for sampler in self.samplers for place in sampler.places})),
+                      tuple(sorted({index for sampler in self.samplers for index in sampler.places})),
                       self.after(self._times[-1] if self._times else self.begin),
                       np.array(self._columns).reshape(len(self._columns), *self.columns.shape))
 

@@ -39,7 +39,7 @@ SHORT, MOST, TRIES = 1e-2, 0.2, 8
 # Iterations for the stages of a bridge, and for the time of an event; changes below which they end, relative.
 ITERATIONS, ENOUGH = 60, 4e-16
 # Steps to one side of an event at which the slope there is evaluated, of a bridge.
-BESIDE = 1e-3
+NEARBY = 1e-3
 # Relative change that iterations may end with.
 LEFT = 1e-12
 
@@ -55,10 +55,10 @@ class Moment(NamedTuple):
 def moments(module: Module, outcome: Outcome, request: Request) -> list[Moment]:
     """Where the motion is cut, in order: events that have an effect, and instants. Raises EvaluationError where both are one."""
     record, direction = outcome.record, 1.0 if request.span[1] >= request.span[0] else -1.0
-    found: dict[float, list[int]] = {}
+    result: dict[float, list[int]] = {}
     for one in outcome.happened:
-        found.setdefault(one.t, []).append(one.event)
-    cuts = [Moment(t, tuple(events), False) for t, events in found.items() if _matter(module, request, outcome, t, events)]
+        result.setdefault(one.t, []).append(one.event)
+    cuts = [Moment(t, tuple(events), False) for t, events in result.items() if _matter(module, request, outcome, t, events)]
     instants = record.times[record.times > request.span[0]].tolist() if record is not None else []
     close = 1e-9 * abs(request.span[1] - request.span[0])
     for cut in cuts:
@@ -203,12 +203,12 @@ class Chain:
         n_x = len(self.request.x0)
         for piece in reversed(self.pieces):
             if isinstance(piece, Instant):
-                for place, sampled in piece.fresh.items():
-                    at = n_x + self.carried.index(self.module.metadata.inputs[place])
-                    waiting[sampled, place] = waiting.get((sampled, place), 0.0) + weights[at]
+                for index, sampled in piece.fresh.items():
+                    at = n_x + self.carried.index(self.module.metadata.inputs[index])
+                    waiting[sampled, index] = waiting.get((sampled, index), 0.0) + weights[at]
                     weights[at] = 0.0
-                for place, row in piece.sampled.items():
-                    weights[:n_x] += waiting.pop((piece.number, place), 0.0) * row
+                for index, row in piece.sampled.items():
+                    weights[:n_x] += waiting.pop((piece.number, index), 0.0) * row
             elif isinstance(piece, Jump) and piece.after is None:
                 value += piece.back(integral, weights, by_time())
             else:
@@ -263,7 +263,7 @@ class Chain:
         self.n_steps += 1
         t, x = at + bridge.length, bridge.end
         field = Field(self.module, way.request)
-        jump = Jump(way, t, x, field.one_sided(t, x, -BESIDE * bridge.length), cut.events, first, BESIDE * bridge.length)
+        jump = Jump(way, t, x, field.one_sided(t, x, -NEARBY * bridge.length), cut.events, first, NEARBY * bridge.length)
         self._demand_rates(jump, (first,))
         self.pieces.append(jump)
         if any(records[k].stop for k in cut.events):
@@ -271,12 +271,12 @@ class Chain:
         later = self.cuts[number + 1].t if number + 1 < len(self.cuts) else self.request.span[1]
         after = jump.go_on(x.copy())
         length = min(bridge.length, MOST * (later - t), key=abs)
-        jump.after, jump.slope_after = after, field.one_sided(t, after, BESIDE * length)
+        jump.after, jump.slope_after = after, field.one_sided(t, after, NEARBY * length)
         if len(cut.events) > 1:
-            self._several(jump, BESIDE * (length or bridge.length))
+            self._several(jump, NEARBY * (length or bridge.length))
         if not length:
             return t, after, False
-        bridge = Bridge.over(way, t, after, length, BESIDE * length)
+        bridge = Bridge.over(way, t, after, length, NEARBY * length)
         self.pieces.append(bridge)
         return t + length, bridge.end, False
 
@@ -339,7 +339,7 @@ class Chain:
             if k >= 0 and abs(begin + of.offset + k * of.period - t) <= near:
                 slopes = sampler.columns(t, x, np.eye(len(x)))
                 sampled |= dict(zip(sampler.places, slopes, strict=True))
-            for place in sampler.places:
-                if self.record.fresh[row, place]:
-                    fresh[place] = int(np.argmin(np.abs(np.array(times) - (t - of.delay))))
+            for index in sampler.places:
+                if self.record.fresh[row, index]:
+                    fresh[index] = int(np.argmin(np.abs(np.array(times) - (t - of.delay))))
         return Instant(number, sampled, fresh)

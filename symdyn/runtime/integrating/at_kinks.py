@@ -30,19 +30,19 @@ def has_kink(values: Callable[[np.ndarray], np.ndarray], x: np.ndarray, k: int) 
     rows = np.tile(x, (1 + 2 * len(h), 1))
     rows[1:, k] += np.concatenate([h, -h])
     try:
-        found = np.asarray(values(rows), dtype=float).reshape(len(rows), -1)
+        result = np.asarray(values(rows), dtype=float).reshape(len(rows), -1)
     except EvaluationError:
         return False
-    bent = found[1:1 + len(h)] + found[1 + len(h):] - 2 * found[0]
+    bent = result[1:1 + len(h)] + result[1 + len(h):] - 2 * result[0]
     alike = np.ptp(bent / h[:, None], axis=0) <= SAME * np.abs(bent / h[:, None]).max(axis=0)
-    rounding = np.finfo(float).eps * np.abs(found).max(axis=0)
+    rounding = np.finfo(float).eps * np.abs(result).max(axis=0)
     return bool((alike & (np.abs(bent) > ABOVE * rounding).all(axis=0)).any())
 
 
 def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, integral: Cost | None = None) -> list[str]:
     """What to warn of where an entry of the state stays at a kink of the right-hand side, or of the integral of a loss, from one
     of the rows x (n_t, n_x) at times t to the next."""
-    found = []
+    result = []
     for k in range(x.shape[1]):
         rows = np.flatnonzero(x[1:, k] == x[:-1, k])
         if not len(rows):
@@ -52,11 +52,11 @@ def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, inte
         where = f"{module.name}: {module.metadata.x[k]} stays at {at[k]:.6g}, where"
         if module.metadata.not_smooth and has_kink(
                 lambda states: module.evaluate("rhs", time, states, request.p, inputs(states)), at, k):  # noqa: B023
-            found.append(f"{where} the equations have a kink: {REMEDY}")
+            result.append(f"{where} the equations have a kink: {REMEDY}")
         elif integral is not None and not integral.smooth and has_kink(
                 lambda states: integral(np.full(len(states), time), states, inputs(states)).values, at, k):  # noqa: B023
-            found.append(f"{where} the integral of the loss has a kink: {REMEDY}")
-    return found
+            result.append(f"{where} the integral of the loss has a kink: {REMEDY}")
+    return result
 
 
 def ending(module: Module, request: Request, t: float, x: np.ndarray, end: Cost) -> list[str]:

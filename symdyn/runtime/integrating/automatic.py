@@ -50,11 +50,11 @@ def automatic(module: Module, request: Request, trial: Trial) -> tuple[str, str]
     explicit, stiff = (DEFAULT, STIFF) if module.backend == "c" else ("DOP853", "Radau")
     if module.backend == "c" and not _fits(module, request, stiff):
         stiff = "Radau"
-    verdict, found = _stiffness(module, request, trial, explicit, stiff)
+    verdict, result = _stiffness(module, request, trial, explicit, stiff)
     if verdict == "stiff":
-        return stiff, found
+        return stiff, result
     method, choice = _by_tolerance(module, request, verdict, explicit)
-    return method, f"{found}; {choice}"
+    return method, f"{result}; {choice}"
 
 
 def _by_tolerance(module: Module, request: Request, verdict: str, explicit: str) -> tuple[str, str]:
@@ -95,17 +95,17 @@ def _stiffness(module: Module, request: Request, trial: Trial, explicit: str, st
     """"stiff" if an implicit method takes far longer steps than an explicit one, "limited" if it does not and stability limits
     those, else nothing; and what was found, in words."""
     asked = replace(request, times=None, max_steps=TRIAL_STEPS)
-    found = trial(asked, explicit)
-    steps = np.abs(np.diff(found.t))
-    if found.success:
-        return "", (f"no implicit method is needed: an explicit trial run reaches the end in {found.n_steps} steps, of "
+    result = trial(asked, explicit)
+    steps = np.abs(np.diff(result.t))
+    if result.success:
+        return "", (f"no implicit method is needed: an explicit trial run reaches the end in {result.n_steps} steps, of "
                     f"{TRIAL_STEPS} that it may take")
-    n, end = request.n_state, float(found.t[-1]) if len(found.t) else request.span[0]
+    n, end = request.n_state, float(result.t[-1]) if len(result.t) else request.span[0]
     unknown = "whether the motion is stiff is not known"
     if len(steps) < TRIAL_STEPS:
         return "", f"{unknown}: a trial run stopped at t = {end:.3g} s, after {len(steps)} of {TRIAL_STEPS} explicit steps"
     length = float(np.median(steps[-20:]))
-    x = found.x[-1][:n]
+    x = result.x[-1][:n]
     modes = Modes.at(module, request, end, x)
     if modes is None:
         return "", (f"{unknown}: at t = {end:.3g} s, after {TRIAL_STEPS} explicit steps, the right-hand side cannot be evaluated "
@@ -116,7 +116,7 @@ def _stiffness(module: Module, request: Request, trial: Trial, explicit: str, st
     to_come = abs(request.span[1] - end)
     later = replace(asked, span=(end, request.span[1]), x0=x.copy(), first_step=0.0, max_steps=STIFF_STEPS)
     try:
-        if product <= LIMITED and (doubt := _doubt(module, found, request, product, to_come / length)):
+        if product <= LIMITED and (doubt := _doubt(module, result, request, product, to_come / length)):
             ringing = modes.ringing(request.atol[:n] + request.rtol * np.abs(x))
             if ringing is None or not _outlasted(ringing.time, length, to_come, modes.radius):
                 return "", f"{doubt} ({limited})"
@@ -147,15 +147,15 @@ def _outlasted(ringing: float, length: float, to_come: float, radius: float) -> 
     return after >= max(MANY, (IMPLICIT - 1) * ringing / length)
 
 
-def _doubt(module: Module, found: Outcome, request: Request, product: float, to_come: float) -> str:
+def _doubt(module: Module, result: Outcome, request: Request, product: float, to_come: float) -> str:
     """Why no implicit method is tried where stability need not limit the explicit one; empty: it is worth a trial."""
     if product < WORTH:
         return "accuracy, not stability, limits explicit steps"
     half, n = TRIAL_STEPS // 2, request.n_state
-    rough = _roughest(found.t[-half:], found.x[-half:, :n], request.rtol, request.atol[:n])
+    rough = _roughest(result.t[-half:], result.x[-half:, :n], request.rtol, request.atol[:n])
     if rough is not None:
-        return (f"the motion itself, not stability, asks for short steps: over {half} explicit ones, to t = {found.t[-1]:.3g} s, "
-                f"{module.metadata.x[rough.entry]} departs from a cubic by {100 * rough.missed:.2g} % of its range, where "
+        return (f"the motion itself, not stability, asks for short steps: over {half} explicit ones, to t = {result.t[-1]:.3g} "
+                f"s, {module.metadata.x[rough.entry]} departs from a cubic by {100 * rough.missed:.2g} % of its range, where "
                 f"{100 * rough.allowed:.2g} % would be smooth")
     return (f"stiffness does not matter: some {to_come:.0f} explicit steps are to come, fewer than the {MANY} from which on an "
             "implicit method pays" if to_come < MANY else "")

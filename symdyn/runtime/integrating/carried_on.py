@@ -101,8 +101,8 @@ class CarriedOn:
         if not held:
             return np.zeros((directions.shape[1], gaps.shape[1]))
         own = directions[[rows[k] for k in held]]
-        found: np.ndarray = own.T @ self.projector.impulses(own, held, gaps)
-        return found
+        result: np.ndarray = own.T @ self.projector.impulses(own, held, gaps)
+        return result
 
     def _demand_ends(self, module: Module, onto: np.ndarray, directions: np.ndarray, held: Sequence[int]) -> None:
         """Raises EvaluationError where coordinates off the constraints come back on a way of their own: what is held leaves

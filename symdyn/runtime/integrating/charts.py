@@ -25,11 +25,11 @@ INSTEAD = "take EulerParameters, or another sequence"
 def distances(module: Module, x: np.ndarray) -> np.ndarray:
     """How far the angles of every chart are from gimbal lock, rad, (n, n_charts), of rows of states."""
     names, rows = module.metadata.x, np.atleast_2d(x)
-    found = []
+    result = []
     for _, sequence, _, name in module.metadata.charts:
         angle = rows[:, names.index(name)]
-        found.append(np.abs(np.cos(angle) if len(set(sequence)) == 3 else np.sin(angle)))
-    return np.array(found).reshape(-1, len(rows)).T
+        result.append(np.abs(np.cos(angle) if len(set(sequence)) == 3 else np.sin(angle)))
+    return np.array(result).reshape(-1, len(rows)).T
 
 
 def at_lock(module: Module, x: np.ndarray) -> str:
@@ -48,9 +48,9 @@ def locked(module: Module, t: np.ndarray, x: np.ndarray, rtol: float) -> list[st
     """A sentence for every chart whose angles are too near to gimbal lock in some of many motions, at the states that are kept:
     t (n_t,), x (n, n_t, n_x), NaN where there is no state."""
     messages = []
-    found = distances(module, x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
+    result = distances(module, x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
     for k, (joint, sequence, speeds, _) in enumerate(module.metadata.charts):
-        near = np.where(np.isfinite(found[..., k]), found[..., k], np.inf)
+        near = np.where(np.isfinite(result[..., k]), result[..., k], np.inf)
         wrong = np.flatnonzero((near < _limit(rtol, speeds)).any(axis=1))
         if len(wrong):
             worst, i = divmod(int(near.argmin()), len(t))

@@ -52,14 +52,14 @@ class Chatter:
         self.t, self.n_steps, self.looks = t, n_steps, self.looks + 1
         shrunk = step < SHRUNK * self.longest
         self.longest = max(self.longest, step)
-        found = self._sliding(t, x[:self.n_state], NEAR * step) if shrunk or self.looks <= LOOKS else None
-        if found is None or found[0] != self.on:
-            self.on, self.found, self.since, self.steps_then = None if found is None else found[0], 0, t, n_steps
-        self.found += found is not None
-        if found is None or self.found < LOOKS:
+        result = self._sliding(t, x[:self.n_state], NEAR * step) if shrunk or self.looks <= LOOKS else None
+        if result is None or result[0] != self.on:
+            self.on, self.found, self.since, self.steps_then = None if result is None else result[0], 0, t, n_steps
+        self.found += result is not None
+        if result is None or self.found < LOOKS:
             return ""
-        return (f"{self._drive(*found)}, and every step crosses it, the latest {n_steps - self.steps_then} steps took "
-                f"{abs(t - self.since):.3g} s; {self._remedy(found[0])}")
+        return (f"{self._drive(*result)}, and every step crosses it, the latest {n_steps - self.steps_then} steps took "
+                f"{abs(t - self.since):.3g} s; {self._remedy(result[0])}")
 
     def skip(self, t: float, n_steps: int) -> str:
         """Leave out a look, at t after so many steps, whose lengths have other reasons; ""."""
@@ -68,8 +68,8 @@ class Chatter:
 
     def of_small_steps(self, t: float, x: np.ndarray) -> str:
         """What to add to a message where a step became too small; "" where the motion does not slide."""
-        found = self._sliding(t, x[:self.n_state], WITHIN)
-        return "" if found is None else f"; {self._drive(*found)}; {self._remedy(found[0])}"
+        result = self._sliding(t, x[:self.n_state], WITHIN)
+        return "" if result is None else f"; {self._drive(*result)}; {self._remedy(result[0])}"
 
     def _drive(self, k: int, up: float, down: float) -> str:
         about = self.about[k]

@@ -28,7 +28,7 @@ from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_si
 from symdyn.runtime.raised import InputRaised
 
 if TYPE_CHECKING:
-    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.building.library import CLibrary
     from symdyn.runtime.module import Module
 
 # Attempted steps in one call; a fraction of a second even for large systems.
@@ -59,20 +59,20 @@ def events_waiting(n_events: int) -> int:
 class Run:
     """One run of the integrator with the memory it works in."""
 
-    def __init__(self, unit: CUnit, request: Request) -> None:
-        self.unit = unit
-        self.n_x = unit.metadata.sizes.x
+    def __init__(self, library: CLibrary, request: Request) -> None:
+        self.library = library
+        self.n_x = library.metadata.sizes.x
         self.trouble: list[BaseException] = []
         self.guard: Any = contextlib.nullcontext()
-        size = unit.function("simulation_size")
+        size = library.function("simulation_size")
         size.restype = ctypes.c_long
         self.size = size()
         self.memory = ctypes.create_string_buffer(self.size + 64)
         self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
         self.request = request
-        self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, unit.metadata.n_c))
+        self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, library.metadata.n_c))
         self.p[:len(request.field_p)] = request.field_p
-        unit.prologue(self.p, self.c)
+        library.prologue(self.p, self.c)
         self.problem = Problem(self.p.ctypes.data, self.c.ctypes.data)
         self.problem.project = int(request.stabilization.way == "projection")
         self.problem.length = request.stabilization.length
@@ -91,12 +91,12 @@ class Run:
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
             self.rows = np.zeros((events_waiting(len(self.look)), 2 + 2 * self.n_x))
-            unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
-                                             ctypes.c_double(request.event_spacing))
+            library.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
+                                                ctypes.c_double(request.event_spacing))
             if request.carried is not None:
                 carried = np.ascontiguousarray(request.carried[:3], dtype=float)
-                unit.function("simulation_carry")(self.address, ctypes.c_void_p(carried.ctypes.data),
-                                                  ctypes.c_int(request.carried.reset))
+                library.function("simulation_carry")(self.address, ctypes.c_void_p(carried.ctypes.data),
+                                                     ctypes.c_int(request.carried.reset))
 
     def _inputs(self, request: Request) -> None:
         free = request.inputs
@@ -112,7 +112,7 @@ class Run:
             self.problem.n_pieces, self.problem.breaks, self.problem.pieces = len(pieces), breaks.ctypes.data, pieces.ctypes.data
         if free.function is not None:
             n_x, n_in, n_state, n_columns = self.n_x, len(constant), request.n_state, len(request.columns)
-            places = [self.unit.metadata.inputs.index(name) for name in request.followed]
+            places = [self.library.metadata.inputs.index(name) for name in request.followed]
 
             def call(t: float, x: Any, out: Any) -> int:
                 if self.trouble:  # the integrator tries smaller steps before it gives up
@@ -151,7 +151,7 @@ class Run:
         with self.guard:
             status = self._timed("simulation_go", ctypes.c_int(every), *arguments, ctypes.byref(self.written))
         if self.rows is not None:
-            take = self.unit.function("simulation_events")
+            take = self.library.function("simulation_events")
             take.restype = ctypes.c_long
             n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
             for k, t, *states in self.rows[:n]:
@@ -163,7 +163,7 @@ class Run:
         return status
 
     def _timed(self, name: str, *arguments: Any) -> int:
-        function = self.unit.function(name)
+        function = self.library.function(name)
         begun = clock.perf_counter()
         status = int(function(self.address, *arguments))
         self.seconds += clock.perf_counter() - begun
@@ -180,7 +180,7 @@ class Run:
     def report(self) -> Report:
         """What the run reports now."""
         out, states = RunReport(), np.zeros((2, self.n_x))
-        self.unit.function("simulation_report")(self.address, ctypes.byref(out), ctypes.c_void_p(states.ctypes.data))
+        self.library.function("simulation_report")(self.address, ctypes.byref(out), ctypes.c_void_p(states.ctypes.data))
         return Report(out, *states)
 
 
@@ -190,8 +190,8 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
 
     Raises ArgumentError where such a function returns what does not fit.
     """
-    unit: Any = module.unit(replace(field or RightSide(), method=method))
-    run = Run(unit, with_own_tolerances(request, method))
+    library: Any = module.library(replace(field or RightSide(), method=method))
+    run = Run(library, with_own_tolerances(request, method))
     chatter = chatter_of(module, request)
     piece = PIECE if chatter is None and request.inputs.function is None else STEPS
     short = _short_steps(module, request, method, field)
@@ -315,7 +315,7 @@ def stopped_because(module: Module, run: Run, status: int, report: Report) -> st
 
 def _message(module: Module, run: Run, status: int, report: Report, interrupted: bool, stopped: bool,
              chatters: str) -> str:
-    metadata, of = run.unit.metadata, report.of
+    metadata, of = run.library.metadata, report.of
     x, x_fail = (state[:run.request.n_state] for state in (report.x, report.x_fail))
     t, t_fail = of.t, of.t_fail
     if interrupted:
@@ -330,7 +330,7 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
         near = CHATTER * abs(run.request.span[1] - run.request.span[0])
         return describe_stop(metadata, t, x, at_once(module, run.happened, near))
     if status == STATUS.EVENT_FAILED:
-        why = run.unit.reason(of.reason) if of.reason else not_known(module, of.bad_index)
+        why = run.library.reason(of.reason) if of.reason else not_known(module, of.bad_index)
         return describe_stop(metadata, t_fail, x_fail, why)
     if status == STATUS.RESET_REJECTED:
         why = reset_rejected(metadata.x[of.bad_index], of.reset_gap)
@@ -339,7 +339,7 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
         return describe_stop(metadata, t_fail, x_fail, not_smooth(metadata.x[of.bad_index] if of.bad_index >= 0 else ""))
     if status == STATUS.FIELD_FAILED:
         why = _dependent(module, run, t_fail, x_fail) + _inputs(module, run, t_fail, x_fail)
-        return describe_stop(metadata, t_fail, x_fail, run.unit.reason(of.reason) + why)
+        return describe_stop(metadata, t_fail, x_fail, run.library.reason(of.reason) + why)
     if status == STATUS.NO_SERIES:
         why = f"the right-hand side has no Taylor series: {_series_reason(run, report)}; use method='{DEFAULT}'"
         return describe_stop(metadata, t_fail, x_fail, why)
@@ -361,14 +361,14 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
 
 def shown_name(name: str) -> str:
     """An entry of a state as messages call it: of a column "the derivative of q1 by l1"."""
-    found = re.fullmatch(r"\(d (.+) by \d+ (.*)\)", name)
-    return name if found is None else f"the derivative of {found[1]} by {found[2] or 'an initial value'}"
+    result = re.fullmatch(r"\(d (.+) by \d+ (.*)\)", name)
+    return name if result is None else f"the derivative of {result[1]} by {result[2] or 'an initial value'}"
 
 
 def _series_reason(run: Run, report: Report) -> str:
     """Why a right-hand side that can be evaluated has no series."""
     reason = report.of.reason
-    return run.unit.reason(reason) if reason else "its coefficients are not finite"
+    return run.library.reason(reason) if reason else "its coefficients are not finite"
 
 
 def _dependent(module: Module, run: Run, t: float, x: np.ndarray) -> str:
@@ -390,7 +390,7 @@ def _off(module: Module, run: Run, report: RunReport) -> str:
     """Why a projection failed."""
     rows, reason, worst = module.metadata.constraints, report.reason, report.bad_index
     if reason:
-        return run.unit.reason(reason)
+        return run.library.reason(reason)
     if 0 <= worst < len(rows):
         return not_converged(rows[worst], report.residual, bool(report.of_speeds))
     return "the correction would go further than half the step"

@@ -60,10 +60,10 @@ class ContactChain:
     def back(self, integral: Integral | None, weights: np.ndarray, by_time: Callable[[], float] | None = None) -> float:
         """Carry weights of the end to the start, in place; the integral."""
         value, until = 0.0, self.end[0]
-        for place in reversed(range(len(self.switches))):
-            switch = self.switches[place]
+        for index in reversed(range(len(self.switches))):
+            switch = self.switches[index]
             if until > switch.t:
-                ways = self._forth(switch, until, *self._zeros(place))
+                ways = self._forth(switch, until, *self._zeros(index))
                 for way in reversed(ways):
                     value += way.back(integral, weights)
                 self.memory = max(self.memory, sum(way.memory for way in ways))
@@ -71,18 +71,18 @@ class ContactChain:
             self._across(switch, integral, weights)
         return value
 
-    def _zeros(self, place: int) -> tuple[float | None, float | None]:
+    def _zeros(self, index: int) -> tuple[float | None, float | None]:
         """When slips in space began before the span after a switch, and when they come to their end after it; switches at which
         directions only turn lie between."""
-        if self._is_held(self.switches[place]):
+        if self._is_held(self.switches[index]):
             return None, None
         began, ends = None, None
-        for switch in reversed(self.switches[:place + 1]):
+        for switch in reversed(self.switches[:index + 1]):
             if switch.zero is not None and switch.zero <= switch.t:
                 began = switch.zero
             if switch.zero is not None or switch.events:
                 break
-        for switch in self.switches[place + 1:]:
+        for switch in self.switches[index + 1:]:
             if switch.zero is not None and switch.zero > switch.t:
                 ends = switch.zero
             if switch.zero is not None or switch.events:
@@ -114,9 +114,9 @@ class ContactChain:
     def _turning(self, t: float, x: np.ndarray, p: np.ndarray) -> float:
         """The rate at which changes of slips in space across themselves decay, 1/s, the largest one."""
         at, records = numbers(self.module, t, x, p, self.request.inputs.at(t, x)), self.module.metadata.contacts
-        found = [turning(at, list(rows[1:])) for rows, record in zip(rows_of(records), records, strict=True)
-                 if record.tangents == 2 and p[self.places[record.closed]] and not p[self.places[record.sticking]]]
-        return max(found, default=0.0)
+        result = [turning(at, list(rows[1:])) for rows, record in zip(rows_of(records), records, strict=True)
+                  if record.tangents == 2 and p[self.places[record.closed]] and not p[self.places[record.sticking]]]
+        return max(result, default=0.0)
 
     def _across(self, switch: Switch, integral: Integral | None, weights: np.ndarray) -> None:
         """Carry weights of the state after a switch to that before it, in place."""

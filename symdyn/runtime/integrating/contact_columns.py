@@ -37,7 +37,7 @@ SIXTH, FOURTH = np.array([45.0, -9.0, 1.0]) / 60, np.array([8.0, -1.0, 0.0]) / 1
 TOGETHER, NOISE = 1e-6, 1e-9
 # A rate that the curvature of the quantity outweighs within this part of the time since the switch before grazes zero.
 # The step of differences for that, of this time.
-GRAZES, BESIDE = 1e-6, 1e-4
+GRAZES, NEARBY = 1e-6, 1e-4
 # Which event of a contact sets the time where several of it happen at once.
 FIRST = ("closes", "opens", "sticks", "slips", "turns")
 
@@ -61,8 +61,8 @@ class Shifted:
 
     def at(self, t: float, x: np.ndarray) -> np.ndarray:
         """The inputs at a time, (n_in,)."""
-        found: np.ndarray = np.asarray(self.inputs.at(t, x)) + self.shift
-        return found
+        result: np.ndarray = np.asarray(self.inputs.at(t, x)) + self.shift
+        return result
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ class Switch:
         return later, self._differences(self._state(), moved, "the state after it") - np.outer(later, slope_after)
 
     def _rhs(self, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        found: np.ndarray = self.module.evaluate("rhs", self.t, x, p, self.inputs.at(self.t, x))
-        return found
+        result: np.ndarray = self.module.evaluate("rhs", self.t, x, p, self.inputs.at(self.t, x))
+        return result
 
     def _later(self, moves: Moves, slope: np.ndarray) -> np.ndarray:
         """By how much the switch comes later."""
@@ -137,13 +137,13 @@ class Switch:
 
     def _bent(self, slope: np.ndarray) -> np.ndarray:
         """Changes of the rates of the quantities within a short time, by second differences along the motion."""
-        h, sides = BESIDE * self.since, []
+        h, sides = NEARBY * self.since, []
         for step in (-h, 0.0, h):  # the midpoint rule
             middle = self.module.evaluate("rhs", self.t + step / 2, self.before + step / 2 * slope, self.p_before,
                                           self.inputs.at(self.t + step / 2, self.before + step / 2 * slope))
             sides.append(self._quantities(self.t + step, self.before + step * middle, self.p_before, self.inputs))
-        found: np.ndarray = np.abs(sides[0] - 2 * sides[1] + sides[2]) / h**2 * GRAZES * self.since
-        return found
+        result: np.ndarray = np.abs(sides[0] - 2 * sides[1] + sides[2]) / h**2 * GRAZES * self.since
+        return result
 
     def _quantities(self, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> np.ndarray:
         values: np.ndarray = self.module.evaluate("events", t, x, p, inputs.at(t, x))
@@ -156,8 +156,8 @@ class Switch:
         decided = made(self.t, self.before, self.p_before, self.inputs)[1]
 
         def state(t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> np.ndarray:
-            found, other = made(t, x, p, inputs)
-            return found if other == decided else np.full_like(found, np.nan)
+            result, other = made(t, x, p, inputs)
+            return result if other == decided else np.full_like(result, np.nan)
         return state
 
     def _differences(self, function: Function, moves: Moves, what: str) -> np.ndarray:

@@ -109,15 +109,15 @@ class _Evaluated:
     """The function "contacts" of a module, for one thread, with the parameters that it had last."""
 
     def __init__(self, module: Module) -> None:
-        self.evaluator, self.p = module.unit(CONTACTS).evaluator(CONTACTS), b""
+        self.evaluator, self.p = module.library(CONTACTS).evaluator(CONTACTS), b""
 
     def __call__(self, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> np.ndarray:
         mark = p.tobytes()
         if mark != self.p:
             self.evaluator.set_params(p)
             self.p = mark
-        found: np.ndarray = self.evaluator.one(t, x, inputs)
-        return found
+        result: np.ndarray = self.evaluator.one(t, x, inputs)
+        return result
 
 
 def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
@@ -194,17 +194,17 @@ def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
 
 def not_stepped(records: Sequence[ContactRecord]) -> list[str]:
     """What of contacts method="moreau" does not take, whose steps of one length go across switches: parts of a message."""
-    found = []
+    result = []
     others = {record.contact: record.impact for record in records if record.impact != "newton"}
     if others:
-        found.append("method='moreau' has Newton's law of impacts; "
-                     + ", ".join(f"{contact} has impact={impact!r}" for contact, impact in others.items())
-                     + ": pass impact='newton', or leave out the method")
+        result.append("method='moreau' has Newton's law of impacts; "
+                      + ", ".join(f"{contact} has impact={impact!r}" for contact, impact in others.items())
+                      + ": pass impact='newton', or leave out the method")
     names = [record.name for record in records if IGNORED in record.events]
     if names:
-        found.append(f"contacts {', '.join(names)} are ignored at times, which method='moreau' does not know; leave out the "
-                     "method, and switches are located")
-    return found
+        result.append(f"contacts {', '.join(names)} are ignored at times, which method='moreau' does not know; leave out the "
+                      "method, and switches are located")
+    return result
 
 
 def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
@@ -712,8 +712,8 @@ class _Phases:
             return self._values("rhs", t, x, p)
 
         def slips(t: float, x: np.ndarray) -> dict[int, np.ndarray]:
-            found = self._numbers(t, x).slip
-            return {k: found[self.tangents[k]] for k in self.begins.directions}
+            result = self._numbers(t, x).slip
+            return {k: result[self.tangents[k]] for k in self.begins.directions}
 
         tolerated = max(self._tolerated(t, x, k) for k in self.begins.directions)
         return self.begins.held_until(t, x[:n], rate, slips, tolerated)
@@ -721,14 +721,14 @@ class _Phases:
     def _tolerated(self, t: float, x: np.ndarray, k: int) -> float:
         """The error of the slip of a contact that the tolerances of the speeds let pass."""
         sizes, request = self.module.metadata.sizes, self.request
-        at, found, inputs = self._numbers(t, x).slip[self.tangents[k]], 0.0, request.inputs.at(t, x[:request.n_state])
+        at, result, inputs = self._numbers(t, x).slip[self.tangents[k]], 0.0, request.inputs.at(t, x[:request.n_state])
         for j in range(sizes.q, sizes.q + sizes.u):  # slips are linear in the speeds
             moved = x[:request.n_state].copy()
             moved[j] += 1.0
             values = self._values(CONTACTS, t, moved, request.p, inputs)
             by = _numbers_of(self.module.metadata, values).slip[self.tangents[k]] - at
-            found += float(np.linalg.norm(by)) * (float(request.atol[j]) + request.rtol * abs(float(x[j])))
-        return found
+            result += float(np.linalg.norm(by)) * (float(request.atol[j]) + request.rtol * abs(float(x[j])))
+        return result
 
     def _parameters(self) -> np.ndarray:
         """The parameters with the modes of all contacts."""
@@ -795,14 +795,14 @@ class _Phases:
 
     def _timed(self, fired: Sequence[tuple[int, str]]) -> dict[int, str]:
         """The contacts whose events set the time of the latest switch, with the event. A slip that only turns changes nothing."""
-        found = {}
+        result = {}
         timed = [one for one in fired if one[1] in FIRST]  # the others change nothing in the motion
         for k, what in sorted(timed, key=lambda one: FIRST.index(one[1]), reverse=True):
             if what != "turns":
-                found[k] = what
+                result[k] = what
             elif self.modes[k] == STICKING:
-                found[k] = "sticks"
-        return {**found, **dict.fromkeys(sorted(self.closing), "closes")}
+                result[k] = "sticks"
+        return {**result, **dict.fromkeys(sorted(self.closing), "closes")}
 
     def _made_again(self, made: Sequence[Made], t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> tuple[np.ndarray, Any]:
         """The state that a switch makes of another one, and what the contacts that are hit do there."""
@@ -833,11 +833,11 @@ class _Phases:
         key = name, p.tobytes()
         evaluator = self.evaluators.get(name)
         if evaluator is None or evaluator[0] != key:
-            made = self.module.unit(name).evaluator(name) if evaluator is None else evaluator[1]
+            made = self.module.library(name).evaluator(name) if evaluator is None else evaluator[1]
             made.set_params(p)
             self.evaluators[name] = evaluator = key, made
-        found: np.ndarray = evaluator[1].one(t, x, self.request.inputs.at(t, x) if inputs is None else inputs)
-        return found
+        result: np.ndarray = evaluator[1].one(t, x, self.request.inputs.at(t, x) if inputs is None else inputs)
+        return result
 
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
@@ -942,8 +942,8 @@ class _Phases:
         """The state after a step h of Heun's method, (n_state,); rate: x_dot at t."""
         n = self.request.n_state
         f = rate[:n]
-        found: np.ndarray = x[:n] + h / 2 * (f + self._values("rhs", t + h, x[:n] + h * f, p)[:n])
-        return found
+        result: np.ndarray = x[:n] + h / 2 * (f + self._values("rhs", t + h, x[:n] + h * f, p)[:n])
+        return result
 
     def _rounding(self, at: Numbers) -> float:
         """The speed that rounding of accelerations makes in the run, m/s, which hits nothing."""
@@ -999,16 +999,16 @@ class _Phases:
                             f"{', '.join(self.records[k].name for k in touching)}; impact='stronge' takes one at a time, as "
                             "energies of several that press at once depend on an order that no law gives; pass 'poisson'")
             one_alone = stronge(D, v, float(at.restitution[touching[0]]), sites[0])
-            found = [] if one_alone is None else [one_alone]
+            result = [] if one_alone is None else [one_alone]
         else:
-            found = impact(D, v, at.restitution[list(touching)].tolist(), sites, law)
-        if not found:
+            result = impact(D, v, at.restitution[list(touching)].tolist(), sites, law)
+        if not result:
             raise _Stop(f"the impact of {names} has no solution under Coulomb's law and impact='{law}'; take the other law of "
                         "impacts, or less friction")
-        if len(found) > 1:
-            self._doubt("impact", t, touching, f"the impact of {names} at t = {t:.9g} s has {len(found)} solutions; the one in "
-                        f"which contacts are {self._named(touching, found[0])} was taken")
-        one = found[0]
+        if len(result) > 1:
+            self._doubt("impact", t, touching, f"the impact of {names} at t = {t:.9g} s has {len(result)} solutions; the one in "
+                        f"which contacts are {self._named(touching, result[0])} was taken")
+        one = result[0]
         n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
         after = x.copy()
         after[n_q:n_q + n_u] += at.speeds[:, places] @ one.lam
@@ -1155,57 +1155,57 @@ class _Phases:
         places, sizes = [self.events[k][what] for k, what in watched], np.array(list(watched.values()))
         now = self._values("events", t, x[:n], p)[places]
         rate = self._values("rhs", t, x[:n], p).copy()
-        unknown, found = now < 0, np.zeros(len(places), dtype=bool)
+        unknown, result = now < 0, np.zeros(len(places), dtype=bool)
         after = max(SHORTEST * self.begins.length, 64 * np.finfo(float).eps * abs(t))
         while unknown.any() and after <= min(LONGEST * self.begins.length, end - t):
             change = self._values("events", t + after, self._stepped(t, x, rate, p, after), p)[places] - now
             known = unknown & (np.abs(change) > RESOLVED * sizes)
-            found |= known & (change < 0)
+            result |= known & (change < 0)
             unknown &= ~known
             after *= LARGER
-        return [one for one, goes in zip(watched, found.tolist(), strict=True) if goes]
+        return [one for one, goes in zip(watched, result.tolist(), strict=True) if goes]
 
     def _choose(self, t: float, x: np.ndarray, at: Numbers, closed: Sequence[int]) -> np.ndarray:
         """The modes of the contacts that are closed, from the accelerations; the others are open. The forces of all rows."""
         places = [row for k in closed for row in self.rows[k]]
         D, b = at.D[np.ix_(places, places)], at.free[places]
-        found = solutions(D, b, self._sites(at, closed)) if places else []
-        if places and not found and self.ruled_out:  # an acceleration that begins at zero has the sign of rounding
+        result = solutions(D, b, self._sites(at, closed)) if places else []
+        if places and not result and self.ruled_out:  # an acceleration that begins at zero has the sign of rounding
             later = self._numbers(*self._a_moment_later(t, x))
-            found = solutions(later.D[np.ix_(places, places)], later.free[places], self._sites(at, closed))
-        if places and not found and self.ruled_out:
+            result = solutions(later.D[np.ix_(places, places)], later.free[places], self._sites(at, closed))
+        if places and not result and self.ruled_out:
             self.ruled_out = {}
-            found = solutions(D, b, self._sites(at, closed))
-        if places and not found:
+            result = solutions(D, b, self._sites(at, closed))
+        if places and not result:
             names = ", ".join(self.records[k].name for k in closed)
             raise _Stop(f"contacts {names}: no accelerations fulfil the laws of contact and friction (Painleve's paradox: "
                         "friction pushes the bodies into each other faster than any force separates them); less friction, or "
                         "elasticity where they touch, leaves a solution")
-        if len(found) > 1:
-            self._doubt("motions", t, closed, f"at t = {t:.9g} s the laws of contact and friction allow {len(found)} motions "
-                        f"(Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
-        border = [closed[k] for k in degenerate(D, b, self._sites(at, closed), found[0])] if found else []
+        if len(result) > 1:
+            self._doubt("motions", t, closed, f"at t = {t:.9g} s the laws of contact and friction allow {len(result)} motions "
+                        f"(Painleve); the one in which contacts are {self._named(closed, result[0])} was taken")
+        border = [closed[k] for k in degenerate(D, b, self._sites(at, closed), result[0])] if result else []
         if border:
             named = ", ".join(self.records[k].name for k in border)
             self._doubt("border", t, border, f"at t = {t:.9g} s contacts {named} are on the border of two modes with the same "
-                        f"accelerations; {self._named(closed, found[0])} was taken, and a small change of the state may lead "
+                        f"accelerations; {self._named(closed, result[0])} was taken, and a small change of the state may lead "
                         "to another motion")
         self.modes = [OPEN] * len(self.records)
         begins = {}
-        self.shared = bool(found) and found[0].shared
-        for k, mode in zip(closed, found[0].modes if found else (), strict=True):
+        self.shared = bool(result) and result[0].shared
+        for k, mode in zip(closed, result[0].modes if result else (), strict=True):
             self.modes[k] = mode.kind
             self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].tangents)
             if self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0 and not mode.kept:
                 begins[k] = self.directions[k]
             self.still[k] = mode.kept or mode.kind == STICKING
-        if found:
-            self._share(t, closed, found[0])
+        if result:
+            self._share(t, closed, result[0])
         self.begins.switched(t, begins, {k: record.tangents == 2 for k, record in enumerate(self.records)
                                          if self.modes[k] == SLIDING})
         forces = np.zeros(len(at.free))
-        if found:
-            forces[places] = found[0].lam
+        if result:
+            forces[places] = result[0].lam
         self.pressed = float(np.abs(forces).max(initial=0.0))
         return forces
 
@@ -1252,34 +1252,34 @@ class _Phases:
 
     def _outside(self, t: float, x: np.ndarray, p: np.ndarray) -> list[tuple[int, str]]:
         """Contacts in space that share forces and have left their cones where nothing looked at these."""
-        force, found = self._by_modes(t, x, p).force, []
+        force, result = self._by_modes(t, x, p).force, []
         static = self._numbers(t, x).static
         for k, mode in enumerate(self.modes):
             if mode == STICKING and self.records[k].tangents == 2:
                 bound = float(static[k]) * float(force[self.normal[k]])
                 if bound < float(np.linalg.norm(force[self.tangents[k]])):
-                    found.append((k, "slips"))
-        return found
+                    result.append((k, "slips"))
+        return result
 
     def _realigned(self, t: float, x: np.ndarray, held: Mapping[int, np.ndarray], before: np.ndarray, after: np.ndarray,
                    zero: float | None) -> np.ndarray:
         """The state with slips along directions, and its columns; before, after: parameters, zero: when slips in space end or
         began."""
         n, request = self.request.n_state, self.request
-        found = self._aligned(t, x, held)
+        result = self._aligned(t, x, held)
         if not request.columns and not self.keeps:
-            return found
+            return result
         again = partial(self._aligned_again, tuple(self.modes), tuple(self.directions), held)
-        switch = Switch(self.module, t, x[:n].copy(), found[:n].copy(), before, after, (), again,
+        switch = Switch(self.module, t, x[:n].copy(), result[:n].copy(), before, after, (), again,
                         request.span[1] - request.span[0], request.inputs, zero)
         if self.keeps:
             self.crossed.append(switch)
         if request.columns:
             try:
-                found[n:] = switch.along(switch.moves(x[n:].reshape(-1, n), request.columns))[1].ravel()
+                result[n:] = switch.along(switch.moves(x[n:].reshape(-1, n), request.columns))[1].ravel()
             except EvaluationError as error:
                 raise _Stop(str(error)) from None
-        return found
+        return result
 
     def _aligned_again(self, modes: Sequence[str], directions: Sequence[np.ndarray], held: Mapping[int, np.ndarray], t: float,
                        x: np.ndarray, p: np.ndarray, inputs: Any) -> tuple[np.ndarray, Any]:
@@ -1331,8 +1331,8 @@ class _Phases:
         places = [row for k in closed for row in self.rows[k]]
         lam = np.zeros(len(at.free))
         if places:
-            found = solutions(at.D[np.ix_(places, places)], at.free[places], self._sites(at, closed))
-            lam[places] = found[0].lam if found else 0.0
+            result = solutions(at.D[np.ix_(places, places)], at.free[places], self._sites(at, closed))
+            lam[places] = result[0].lam if result else 0.0
         w = at.free + at.D @ lam
         begin, end = self.request.span
         shortest = max(SHORTEST_FLIGHT * (end - begin), 1e4 * np.finfo(float).eps * abs(t))

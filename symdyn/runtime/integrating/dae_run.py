@@ -77,7 +77,7 @@ class Stabilized:
                  max_step: float = np.inf, first_step: float | None = None) -> None:
         module, p, integrals = field.module, field.request.p, np.zeros(len(names(field.module)))
         self.field, self.n_x = field, len(x0)
-        self.evaluator = module.unit("residual").evaluator("residual")
+        self.evaluator = module.library("residual").evaluator("residual")
         self.evaluator.set_params(p)
         lam = module.evaluate("lam", t0, x0, p, field.given(t0, x0))
         self.solver = _solver()(self.residual, t0, np.concatenate([x0, integrals, integrals]),

@@ -101,22 +101,22 @@ def not_known(module: Module, k: int) -> str:
     return f"event {module.metadata.events[k].name} cannot be evaluated: the result is not finite"
 
 
-def too_quick(module: Module, found: Sequence[tuple[int, float]]) -> str:
+def too_quick(module: Module, result: Sequence[tuple[int, float]]) -> str:
     """What to warn of where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
-    if not found:
+    if not result:
         return ""
-    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in result]
     return (f"{module.name}: zeros of events may be missed: {', '.join(names)} var{'y' if len(names) > 1 else 'ies'} so quickly "
             f"within a step that {panels.MOST_DIVISIONS} divisions do not resolve it; give a max_step as short as its "
             "shortest wave")
 
 
-def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: float) -> str:
+def not_proved(module: Module, result: Sequence[tuple[int, float]], spacing: float) -> str:
     """What to warn of where quantities may pass zero between their samples, with the time from when on; "" where none does, and
     where the user has chosen the spacing of samples."""
-    if not found or spacing:
+    if not result or spacing:
         return ""
-    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in result]
     return (f"{module.name}: zeros of events may be missed: {', '.join(names)} may pass zero and back between two samples, which "
             f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short "
             "as the shortest pulse that matters")
@@ -182,7 +182,7 @@ class Locator:
         self.bounded = look & np.array([record.enclosed for record in self.records])
         self.size: Any = 0.0  # of the entries of the state over the latest step
         self.known = 0.0  # up to when the quantities are known
-        self.apart = module.unit(EVENTS).evaluator(EVENTS)
+        self.apart = module.library(EVENTS).evaluator(EVENTS)
         self.apart.set_params(p)
         self.over = ""  # why the run ends at an event
         self.failed = ""  # or fails at it
@@ -293,7 +293,7 @@ class Locator:
         becomes = self.module.evaluate(RESETS, t, state[:self.n_state], self.p, self.given(t, state[:self.n_state]))
         for k in changed:
             state[list(self.records[k].reset)] = becomes[self.starts[k]:self.starts[k + 1]]
-        return projector.keeping(t, state, [place for k in changed for place in self.records[k].reset])
+        return projector.keeping(t, state, [index for k in changed for index in self.records[k].reset])
 
     def goes_on(self, after: np.ndarray) -> None:
         """Note the state after the resets of the latest events."""

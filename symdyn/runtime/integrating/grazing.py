@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Errors of a motion, in tolerances of its steps.
 TOLERANCES = 10.0
 # Steps back along the motion, of the time in which the state changes; the same, for the side of an event.
-BACK, BESIDE = 1e-3, 1e-6
+BACK, NEARBY = 1e-3, 1e-6
 # A rate that becomes smaller than this part of itself with steps of an eighth vanishes.
 STAYS = 0.5
 # Relative difference of slopes from which on the right-hand side jumps.
@@ -69,7 +69,7 @@ def _before(module: Module, request: Request, t: np.ndarray, x: np.ndarray, size
     most = np.sqrt(np.mean((size * weight) ** 2))
     length = np.sign(whole) * np.minimum(abs(whole), most / np.maximum(change, 1e-300))
     length = np.where(length == 0, whole, length)
-    side, far = -way * BESIDE * length, slope
+    side, far = -way * NEARBY * length, slope
     for part in (2.0, 1.0):
         far = slope
         for _ in range(3):  # the first ones go over to the side

@@ -72,9 +72,9 @@ def _joined(request: Request, parts: list[Outcome], note: str) -> Outcome:
         kept[meets] = False  # the first row of each part is the last of that before
     else:
         kept[meets - 1] = np.isin(t[meets - 1], request.times)
-    found = [part.corrections for part in parts]
-    corrections = Corrections(max(c.position for c in found), max(c.speed for c in found), sum(c.n_steps for c in found),
-                              sum(c.n_evaluations for c in found))
+    result = [part.corrections for part in parts]
+    corrections = Corrections(max(c.position for c in result), max(c.speed for c in result), sum(c.n_steps for c in result),
+                              sum(c.n_evaluations for c in result))
     return replace(parts[-1], t=t[kept], x=x[kept], message=parts[-1].message + note,
                    n_steps=sum(part.n_steps for part in parts), n_rejected=sum(part.n_rejected for part in parts),
                    n_evaluations=sum(part.n_evaluations for part in parts),

@@ -29,7 +29,7 @@ from symdyn.runtime.integrating.stabilization import Corrections
 
 if TYPE_CHECKING:
     from symdyn.backend.metadata import ContactRecord
-    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.building.library import CLibrary
     from symdyn.runtime.module import Module
 
 CODES = SimpleNamespace(**codes_of("runtime/hybrid.h"))
@@ -141,15 +141,15 @@ class Motion:
             most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=laws.DEPENDENT, different=laws.DIFFERENT, far=FAR,
             tolerated=slip_begins.TOLERATED, rounded=slip_begins.ROUNDED, shortest=slip_begins.SHORTEST, guess=slip_begins.GUESS,
             longest=slip_begins.LONGEST, grows=slip_begins.GROWS, larger=slip_begins.LARGER, guesses=slip_begins.GUESSES)
-        place = {name: k for k, name in enumerate(metadata.parameters)}
-        record.shared_at = place[SHARED]
+        index = {name: k for k, name in enumerate(metadata.parameters)}
+        record.shared_at = index[SHARED]
         events = {event.name: k for k, event in enumerate(metadata.events)}
         tables = {
             "first": np.cumsum([0, *[one.rows for one in records]])[:-1], "rows": [one.rows for one in records],
             "normal": [one.normal for one in records],
-            "closed_at": [place.get(one.closed, -1) for one in records],
-            "sticking_at": [place.get(one.sticking, -1) for one in records],
-            "sliding_at": [place[one.sliding[0]] if one.sliding else -1 for one in records],
+            "closed_at": [index.get(one.closed, -1) for one in records],
+            "sticking_at": [index.get(one.sticking, -1) for one in records],
+            "sliding_at": [index[one.sliding[0]] if one.sliding else -1 for one in records],
             "event": [events[f"{one.name}_{what}"] if what in one.events else -1 for one in records for what in KINDS]}
         for name, values in tables.items():
             memory.take(record, name, np.array(values, dtype=np.intc))
@@ -190,30 +190,30 @@ class Motion:
 
     def _frame(self, member: str, function: str, p: np.ndarray) -> None:
         """A function of the module as a member of the record, with its constants."""
-        unit: Any = self.module.unit(function)
-        constants = self.memory.take(self.record, f"{member}_c", np.zeros(max(1, unit.metadata.n_c)))
-        setattr(self.record, f"n_{member}_c", unit.metadata.n_c)
+        library: Any = self.module.library(function)
+        constants = self.memory.take(self.record, f"{member}_c", np.zeros(max(1, library.metadata.n_c)))
+        setattr(self.record, f"n_{member}_c", library.metadata.n_c)
         prologue = f"{member}_prologue"
-        setattr(self.record, prologue, ctypes.cast(unit.function("prologue"), dict(Record._fields_)[prologue]))
-        self.memory.frame(self.record, member, unit, function, f"of_{member}", (*self.seen, p, constants))
+        setattr(self.record, prologue, ctypes.cast(library.function("prologue"), dict(Record._fields_)[prologue]))
+        self.memory.frame(self.record, member, library, function, f"of_{member}", (*self.seen, p, constants))
 
-    def _phase_code(self, unit: CUnit) -> ctypes.c_void_p:
-        """The code of phases, of a unit with an integrator."""
-        code, keep = PhaseCode(n_constants=unit.metadata.n_c), self.memory.kept
+    def _phase_code(self, library: CLibrary) -> ctypes.c_void_p:
+        """The code of phases, of a library with an integrator."""
+        code, keep = PhaseCode(n_constants=library.metadata.n_c), self.memory.kept
         members = {"prologue": "prologue", "start": "simulation_start", "go": "simulation_go", "look": "simulation_look",
                    "take": "simulation_events", "report": "simulation_report"}
         for member, function in members.items():
-            setattr(code, member, ctypes.cast(unit.function(function), dict(PhaseCode._fields_)[member]))
-        size = unit.function("simulation_size")
+            setattr(code, member, ctypes.cast(library.function(function), dict(PhaseCode._fields_)[member]))
+        size = library.function("simulation_size")
         size.restype = ctypes.c_long
         memory = np.zeros(size() // 8 + 16)
         code.memory = (memory.ctypes.data + 63) // 64 * 64
         p, c = (self.memory.take(code, name, np.zeros(max(1, count))) for name, count in (("p", self.n_p),
-                                                                                          ("c", unit.metadata.n_c)))
+                                                                                          ("c", library.metadata.n_c)))
         problem = Problem(p.ctypes.data, c.ctypes.data, self.inputs.ctypes.data)
         code.problem = ctypes.addressof(problem)
         self.problems.append(problem)
-        keep += [code, memory, problem, unit]
+        keep += [code, memory, problem, library]
         return ctypes.c_void_p(ctypes.addressof(code))
 
     def start(self, request: Request, constants: Laws, same: float) -> None:
@@ -236,8 +236,8 @@ class Motion:
         """Take the code of phases that was compiled by now: nothing is compiled for what may never come."""
         for name, field in zip(("open", "closed"), self.fields, strict=True):
             if not getattr(self.record, name) and self.module._has(field):
-                unit: Any = self.module.unit(field)
-                setattr(self.record, name, self._phase_code(unit))
+                library: Any = self.module.library(field)
+                setattr(self.record, name, self._phase_code(library))
         if not self.record.rate and self.module._has(RHS):
             self._frame("rate", RHS, self.memory.take(self.record, "rate_p", np.zeros(max(1, self.n_p))))
 

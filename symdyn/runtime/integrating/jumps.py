@@ -119,20 +119,20 @@ class Jump:
             return after
         values = module.evaluate("event_resets", self.t, self.x, p, Field(module, self.way.request).inputs(self.t, self.x))
         after[places] = values[self.resets()[1]]
-        if module.metadata.constraints and any(place < module.metadata.sizes.q + module.metadata.sizes.u for place in places):
+        if module.metadata.constraints and any(index < module.metadata.sizes.q + module.metadata.sizes.u for index in places):
             self.reset = CarriedOn.of(module, self.t, after, p, places)
             return self.reset.after
         return after
 
     def resets(self) -> tuple[list[int], list[int]]:
         """Entries of the state that are reset, and their rows in the function of all resets; the last reset of one counts."""
-        found, row = {}, 0
+        result, row = {}, 0
         for k, record in enumerate(self.way.module.metadata.events):
-            for place in record.reset:
+            for index in record.reset:
                 if k in self.events:
-                    found[place] = row
+                    result[index] = row
                 row += 1
-        return list(found), list(found.values())
+        return list(result), list(result.values())
 
     def _cost(self, integral: Integral, x: np.ndarray, slope: np.ndarray, step: float) -> float:
         """The integrand as it is on one side of a state, where it may jump with the event."""
@@ -173,7 +173,7 @@ class Several:
         for k in range(n - 1 if n > 2 else 0):
             orders.append((*self.events[:k], self.events[k + 1], self.events[k], *self.events[k + 2:]))
         together = self._jump(self.x, self.slope, self.events).go_on(self.x.copy())
-        request, found = self.way.request, []
+        request, result = self.way.request, []
         for order in orders:
             try:
                 jumps = self._ordered(order)
@@ -183,10 +183,10 @@ class Several:
                 return None
             if (np.abs(jumps[-1].after - together) > request.atol + request.rtol * np.abs(together)).any():
                 return None
-            found.append((jumps, self._matrix(jumps)))
-        first = found[0][1]
+            result.append((jumps, self._matrix(jumps)))
+        first = result[0][1]
         size = np.abs(first).max(axis=0)
-        return found[0][0] if all((np.abs(other - first) <= SAME * size).all() for _, other in found) else None
+        return result[0][0] if all((np.abs(other - first) <= SAME * size).all() for _, other in result) else None
 
     def _jump(self, x: np.ndarray, slope: np.ndarray, events: tuple[int, ...]) -> Jump:
         return Jump(self.way, self.t, x, slope, events, events[0], self.side)
@@ -210,7 +210,7 @@ class Several:
         for number, k in enumerate(order):
             jump = self._jump(x, slope, (k,))
             jump.after = jump.go_on(x.copy())
-            sides = {other: 1 if place <= number else -1 for place, other in enumerate(order)}
+            sides = {other: 1 if index <= number else -1 for index, other in enumerate(order)}
             then = self._between(jump.after, sides) if number + 1 < len(order) else None
             if then is None and number + 1 < len(order):
                 return None
@@ -253,11 +253,11 @@ class Several:
 
     def _allowed(self, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Weights of a state and of what is carried, along what the constraints allow."""
-        if "corrected_weights" not in self.way.unit.metadata.shapes:
+        if "corrected_weights" not in self.way.library.metadata.shapes:
             return weights
-        found = self.way.weights("corrected_weights", self.t, x, weights[:len(x)])
-        found[len(x):] += weights[len(x):]
-        return found
+        result = self.way.weights("corrected_weights", self.t, x, weights[:len(x)])
+        result[len(x):] += weights[len(x):]
+        return result
 
 
 def _differ(slope: np.ndarray, other: np.ndarray) -> bool:

@@ -82,7 +82,7 @@ def _dense(stages: int) -> Callable[[Module, Inputs | None], str]:
         size = 8 * n**2 * (stages + 2)
         if size <= LARGEST_MATRICES:
             return ""
-        there = module.places_of_jacobian()
+        there = module.jacobian_indices()
         instead = ("'Radau' of SciPy, whose factors have few entries here" if there is not None and there.sparse else
                    f"'{DEFAULT}'")
         return f"its matrices of {n} states take {size / 2**30:.1f} GiB; use method={instead}"

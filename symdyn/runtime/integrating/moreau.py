@@ -27,7 +27,7 @@ from symdyn.runtime.memory import demand
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
-    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.building.library import CLibrary
     from symdyn.runtime.module import Module
 
 MOREAU = "moreau"
@@ -196,21 +196,21 @@ def _losses(module: Module, touched: Touched, n_steps: int) -> np.ndarray:
     """Energy that contacts with a name, then groups, have taken until each step began, and in all, J, (n_steps + 1, n)."""
     n, groups = len(module.metadata.contacts), module.metadata.contact_groups
     of_body = np.repeat(np.arange(len(groups)), [len(group.bodies) for group in groups])
-    place = touched.a.astype(int)
-    place[touched.b >= 0] = n + of_body[touched.a[touched.b >= 0]]
+    index = touched.a.astype(int)
+    index[touched.b >= 0] = n + of_body[touched.a[touched.b >= 0]]
     end, impulse, begin = (touched.values[:, k:k + 3] for k in (1, 4, 7))
     lost = np.zeros((n_steps + 1, n + len(groups)))
-    np.add.at(lost, (touched.step + 1, place), -((begin + end) * impulse).sum(axis=1) / 2)
+    np.add.at(lost, (touched.step + 1, index), -((begin + end) * impulse).sum(axis=1) / 2)
     return np.cumsum(lost, axis=0)
 
 
 def modes_of(stepped: Stepped, n: int) -> np.ndarray:
     """Whether contacts with a name are open, sticking or sliding in every step, (n_steps, n)."""
-    found = np.zeros((len(stepped.h), n), dtype=int)
+    result = np.zeros((len(stepped.h), n), dtype=int)
     touched = stepped.touched
     named = touched.b < 0
-    found[touched.step[named], touched.a[named]] = touched.state[named]
-    return found
+    result[touched.step[named], touched.a[named]] = touched.state[named]
+    return result
 
 
 def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Phase], np.ndarray]:
@@ -279,11 +279,11 @@ class Stepper:
         memory.take(record, "given_kind", np.array([*(KINDS.get(c.kind, STATUS.PLACED) for c in metadata.contacts), 0],
                                                    dtype=np.intc))
         coordinates = metadata.names("q")
-        place = {q: k for k, q in enumerate(coordinates)}
+        index = {q: k for k, q in enumerate(coordinates)}
         record.n_units = len(metadata.unit_groups)
         memory.take(record, "unit_first", np.cumsum([0, *map(len, metadata.unit_groups)]).astype(places))
         memory.take(record, "unit_index",
-                    np.array([*(place[q] for group in metadata.unit_groups for q in group), 0], dtype=places))
+                    np.array([*(index[q] for group in metadata.unit_groups for q in group), 0], dtype=places))
         listed = ("a", "b", "was_a", "was_b", "was_at", "sum_a", "sum_b", "old_a", "old_b")
         memory.put(record, places, **dict.fromkeys(listed, most), old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
@@ -307,12 +307,12 @@ class Stepper:
             memory.take(record, name, values)
         inputs[:n_in] = request.inputs.constant
         named = bool(module.metadata.contacts)
-        field: Any = module.unit(RightSide(work=request.works, open_contacts=named))
-        contacts: Any = module.unit(GAPS if named else SPHERES)
+        field: Any = module.library(RightSide(work=request.works, open_contacts=named))
+        contacts: Any = module.library(GAPS if named else SPHERES)
         seen = (t, x, inputs)
 
-        def add(member: str, unit: CUnit, function: str, result: str) -> np.ndarray:
-            return memory.function(record, member, unit, function, result, seen, request.p)
+        def add(member: str, library: CLibrary, function: str, result: str) -> np.ndarray:
+            return memory.function(record, member, library, function, result, seen, request.p)
 
         add("field", field, "rhs", "xd")
         if named:

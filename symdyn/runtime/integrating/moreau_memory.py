@@ -12,7 +12,7 @@ from symdyn.backend.c_records import codes_of, fields_of
 from symdyn.runtime.building.library import Frame
 
 if TYPE_CHECKING:
-    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.building.library import CLibrary
 
 # Sweeps whose changes are combined.
 DEPTH = codes_of("runtime/cones_type.h")["CONES_DEPTH"]
@@ -59,22 +59,22 @@ class Memory:
         setattr(record, name, values.ctypes.data)
         return values
 
-    def function(self, record: Any, name: str, unit: CUnit, function: str, result: str,
+    def function(self, record: Any, name: str, library: CLibrary, function: str, result: str,
                  arguments: Sequence[np.ndarray], p: np.ndarray) -> np.ndarray:
         """A generated function as a member of a record, with its frame and its results, for given parameters."""
-        constants, taken = np.zeros(max(1, unit.metadata.n_c)), np.zeros(max(1, len(p)))
+        constants, taken = np.zeros(max(1, library.metadata.n_c)), np.zeros(max(1, len(p)))
         taken[:len(p)] = p
-        unit.prologue(taken, constants)
-        return self.frame(record, name, unit, function, result, (*arguments, taken, constants))
+        library.prologue(taken, constants)
+        return self.frame(record, name, library, function, result, (*arguments, taken, constants))
 
-    def frame(self, record: Any, name: str, unit: CUnit, function: str, result: str,
+    def frame(self, record: Any, name: str, library: CLibrary, function: str, result: str,
               arguments: Sequence[np.ndarray]) -> np.ndarray:
         """The same for arrays of t, x, inputs, parameters and constants that may change."""
         t, x, inputs, p, constants = arguments
-        out, ud = np.zeros(int(np.prod(unit.metadata.shapes[function]))), np.zeros(max(1, unit.metadata.sizes.ud))
+        out, ud = np.zeros(int(np.prod(library.metadata.shapes[function]))), np.zeros(max(1, library.metadata.sizes.ud))
         frame = Frame(1, *[a.ctypes.data for a in (t, x, ud, inputs, p, constants, out)], 1, 1, 1, 1, 0)
-        self.kept += [out, ud, p, constants, frame, unit]
-        setattr(record, name, ctypes.cast(unit.function(f"{function}_rows"), dict(record._fields_)[name]))
+        self.kept += [out, ud, p, constants, frame, library]
+        setattr(record, name, ctypes.cast(library.function(f"{function}_rows"), dict(record._fields_)[name]))
         setattr(record, f"{name}_frame", ctypes.addressof(frame))
         setattr(record, result, out.ctypes.data)
         return out

@@ -132,8 +132,8 @@ class CompiledSolver(OdeSolver):
             request = replace(request, x0=Projector(self.module, of.p)(t0, start))
         if fun is not None:
             self._compare(free)
-        unit: Any = self.module.unit(RightSide(method=of.method, baumgarte=by_gain))
-        self.run = Run(unit, with_own_tolerances(request, of.method))
+        library: Any = self.module.library(RightSide(method=of.method, baumgarte=by_gain))
+        self.run = Run(library, with_own_tolerances(request, of.method))
         self._t, self._x = np.empty(1), np.empty((1, self.n))
         self._states = [(t0, start)]
         if self.n and t0 != t_bound:
@@ -156,10 +156,10 @@ class CompiledSolver(OdeSolver):
                 wanted = self.module.evaluate("rhs", t, y, self.setting.p, free.at(t, y))
             except EvaluationError:
                 continue
-            found = np.asarray(self.fun_single(t, y), dtype=float)
-            if found.shape != wanted.shape or not np.abs(found - wanted).max() <= _SAME * np.abs(wanted).max():
+            result = np.asarray(self.fun_single(t, y), dtype=float)
+            if result.shape != wanted.shape or not np.abs(result - wanted).max() <= _SAME * np.abs(wanted).max():
                 raise ArgumentError(f"{self.module.name}: fun is not the right-hand side that this solver integrates: at "
-                                    f"t = {t:.6g} it returns {shown(found)} instead of {shown(wanted)}; pass "
+                                    f"t = {t:.6g} it returns {shown(result)} instead of {shown(wanted)}; pass "
                                     "solver.rhs as fun, with the parameters and inputs given to module.ode_solver")
 
     def _step_impl(self) -> tuple[bool, str | None]:
@@ -236,8 +236,8 @@ class WithinStep(DenseOutput):
         if len(outside):
             raise ArgumentError(f"t = {outside[0]:.9g} lies outside of the step from {self.t_old:.9g} to {self.t:.9g}; integrate "
                                 "over a span that contains it")
-        found = self.states(times)
-        return found[:, 0] if np.ndim(t) == 0 else found
+        result = self.states(times)
+        return result[:, 0] if np.ndim(t) == 0 else result
 
 
 def solver_of(setting: Setting) -> type[CompiledSolver]:

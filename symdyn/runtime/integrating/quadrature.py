@@ -169,12 +169,12 @@ class Integral:
     def _jumping(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, values: np.ndarray,
                  outer: float) -> np.ndarray:
         """Steps in which the integrand may jump."""
-        found = np.zeros(len(h), dtype=bool)
+        result = np.zeros(len(h), dtype=bool)
         if self.cost.surfaces is not None:
-            found |= self._crossed(t, x, inputs, len(h)).any(axis=1)
+            result |= self._crossed(t, x, inputs, len(h)).any(axis=1)
         if not self.cost.known and outer:
-            found |= (np.abs(h) < INNER * abs(outer)) & (np.ptp(values, axis=1) > VARY * self.largest)
-        return found
+            result |= (np.abs(h) < INNER * abs(outer)) & (np.ptp(values, axis=1) > VARY * self.largest)
+        return result
 
     def _crossed(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, n: int) -> np.ndarray:
         """Which surfaces change their sign in which of n steps; a motion that begins on one does not cross it."""
@@ -193,8 +193,8 @@ class Integral:
         if self.cost.surfaces is not None:
             crossed = np.flatnonzero(self._crossed(t, x, inputs, 1)[0])
         if len(crossed) == 1:
-            found = self.cost.surfaces(t, x, inputs)  # type: ignore[misc]
-            g, row = found.values[:, crossed[0]], found.slopes[0, crossed[0]]
+            result = self.cost.surfaces(t, x, inputs)  # type: ignore[misc]
+            g, row = result.values[:, crossed[0]], result.slopes[0, crossed[0]]
             n_x = x.shape[1]
             rate, seen = float(row[0] + row[1:1 + n_x] @ slope), float((g[-1] - g[0]) / (t[-1] - t[0]))
             if abs(rate - seen) > VARY * abs(seen):  # inputs vary with the time, too
@@ -219,13 +219,13 @@ class Integral:
 
     def doubts(self) -> list[str]:
         """What to warn of."""
-        found = list(dict.fromkeys(self.jumps))
+        result = list(dict.fromkeys(self.jumps))
         if self.left > 1 or self.left_slope > 1:
             size = f"by as much as {self.left * self.tolerance:.3g}" if self.left > 1 else "in its derivatives"
-            found.append(f"{self.module.name}: the integral of the loss may be off {size}: near t = {self.at:.6g} s its "
-                         "integrand is not resolved by shorter steps, as at a pole; write it as an extra state, "
-                         "system.add_state(...), with an event where it breaks, or leave that part of the motion out")
-        return found
+            result.append(f"{self.module.name}: the integral of the loss may be off {size}: near t = {self.at:.6g} s its "
+                          "integrand is not resolved by shorter steps, as at a pole; write it as an extra state, "
+                          "system.add_state(...), with an event where it breaks, or leave that part of the motion out")
+        return result
 
 
 def _weights(method: str) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:

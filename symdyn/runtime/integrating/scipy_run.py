@@ -18,7 +18,7 @@ from symdyn.runtime.integrating.events import Locator, not_proved, too_quick
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.short_steps import TRIED_OF_SCIPY, ShortSteps
-from symdyn.runtime.integrating.stabilization import Corrections, ProjectionFailed, Projector, Watch
+from symdyn.runtime.integrating.stabilization import Corrections, DriftCheck, ProjectionFailed, Projector
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
 from symdyn.shown import shown
@@ -66,7 +66,7 @@ class Field:
     def __init__(self, module: Module, request: Request, right_side: RightSide) -> None:
         self.module, self.request = module, request
         self.bound = module.bind(request.p)
-        self.evaluator = module.unit(right_side).evaluator("rhs")
+        self.evaluator = module.library(right_side).evaluator("rhs")
         self.evaluator.set_params(request.field_p)
         self.n_in = len(request.inputs.constant)
         self.trouble: list[str] = []
@@ -120,7 +120,7 @@ class SparseJacobian:
 
     def __init__(self, module: Module, request: Request, there: Places) -> None:
         self.module, self.request, self.there = module, request, there
-        self.evaluator = module.unit(NAME).evaluator(NAME)
+        self.evaluator = module.library(NAME).evaluator(NAME)
         self.evaluator.set_params(request.p)
 
     def __call__(self, t: float, x: np.ndarray, inputs: Any) -> Any:
@@ -147,12 +147,12 @@ class Run:
 
     def __init__(self, module: Module, request: Request, solver_class: Any, right_side: RightSide) -> None:
         self.module, self.request, self.solver_class, self.right_side = module, request, solver_class, right_side
-        self.metadata = module.unit(right_side).metadata
+        self.metadata = module.library(right_side).metadata
         self.field = Field(module, request, right_side)
         self.options = self._options()
         way = request.stabilization.way
         self.projector = Projector(module, request.p) if way == "projection" else None
-        self.watch = Watch(module, request.p) if way == "baumgarte" else None
+        self.drift = DriftCheck(module, request.p) if way == "baumgarte" else None
         self.locator: Locator | None = None
         if request.look is not None and request.look.any():
             span = request.span[1] - request.span[0]
@@ -186,7 +186,7 @@ class Run:
         if issubclass(self.solver_class, (integrate.Radau, integrate.BDF, integrate.LSODA)) and exact:
             options["jac"] = self.field.jacobian
         if issubclass(self.solver_class, (integrate.Radau, integrate.BDF)) and exact:
-            there = self.module.places_of_jacobian()
+            there = self.module.jacobian_indices()
             if there is not None and there.sparse:
                 self.field.sparse = SparseJacobian(self.module, request, there)
         return options
@@ -250,8 +250,8 @@ class Run:
         self._store()
         if cut is not None:
             self._go_on(cut)
-        if not self.message and self.watch is not None and self.watch(self.here, self.state):
-            self.message = self.watch(self.here, self.state) + self.dependent()
+        if not self.message and self.drift is not None and self.drift(self.here, self.state):
+            self.message = self.drift(self.here, self.state) + self.dependent()
         if not self.message and self.solver.status == "finished" and self.here != self.request.span[1]:
             self._go_on_after_kink()
         if not self.message and self.chatter is not None and self.accepted % STEPS_OF_SCIPY == 0:
@@ -286,8 +286,8 @@ class Run:
         """What to add to a message where constraints depend on each other, unlike at the start."""
         n, p, start = self.request.n_state, self.request.p, self.request.x0
         places = [(self.here, self.state), *(self.field.failed if self.field.trouble else ())]
-        found = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
-        return next(filter(None, found), "")
+        result = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
+        return next(filter(None, result), "")
 
     def _project(self) -> None:
         solver = self.solver

@@ -88,7 +88,7 @@ class Asked:
         part = 1.0 / np.sqrt(1.0 + len(self.columns))
         of_columns = part * request.atol / self.sizes[:, None] if controlled else np.full(self.starts.shape, _ANY)
         names = [name for k, name in enumerate(inputs) if k in request.inputs.places] if request.inputs.are_held else []
-        followed = [inputs[place] for places, *_ in request.inputs.gradients for place in places]
+        followed = [inputs[index] for places, *_ in request.inputs.gradients for index in places]
         return replace(request, held=tuple(names), followed=tuple(followed), rtol=part * request.rtol,
                        x0=np.concatenate([request.x0, self.starts.ravel()]),
                        atol=np.concatenate([part * request.atol, of_columns.ravel()]), columns=self.columns)
@@ -107,7 +107,7 @@ class Asked:
         if any(one.sampled.gradient is None for one in request.inputs.samplers):
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but the derivatives of a sampled controller by "
                                 "the state are not known; pass sd.Sampled(function, period, gradient=...), a function of (t, x)")
-        unknown = _depend_on_state(request) - {place for places, *_ in request.inputs.gradients for place in places}
+        unknown = _depend_on_state(request) - {index for places, *_ in request.inputs.gradients for index in places}
         if unknown:
             names = ", ".join(module.metadata.inputs[k] for k in sorted(unknown))
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "
@@ -135,17 +135,17 @@ class Asked:
         columns = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x)
         nothing = [name for k, name in enumerate(self.names) if not columns[:, k].any()]
         moved = _moving_jumps(module, request, known(), nothing) if module.metadata.switches else {}
-        found = [f"{module.name}: {name} moves a jump of the right-hand side, where {surface} passes zero, and nothing else "
-                 "here: without an event there its sensitivity is zero, which is that between jumps; add an event, "
-                 f"system.add_event(name, {surface})" for name, surface in moved.items()]
+        result = [f"{module.name}: {name} moves a jump of the right-hand side, where {surface} passes zero, and nothing else "
+                  "here: without an event there its sensitivity is zero, which is that between jumps; add an event, "
+                  f"system.add_event(name, {surface})" for name, surface in moved.items()]
         nothing = [name for name in nothing if name not in moved]
         if nothing:
-            found.append(f"{but} {', '.join(nothing)}: the sensitivities are zero")
+            result.append(f"{but} {', '.join(nothing)}: the sensitivities are zero")
         cancel = self._cancelling(module, request, outcome, columns[0], known, [*nothing, *moved])
         if cancel:
-            found.append(f"{but} {', '.join(cancel)}, which cancel{'s' if len(cancel) == 1 else ''} in its equations: the "
-                         "sensitivities are zero, and the numbers what is left of rounding")
-        return [*found, *gathered(module, outcome), *jumps, *_grazing(module, request, outcome),
+            result.append(f"{but} {', '.join(cancel)}, which cancel{'s' if len(cancel) == 1 else ''} in its equations: the "
+                          "sensitivities are zero, and the numbers what is left of rounding")
+        return [*result, *gathered(module, outcome), *jumps, *_grazing(module, request, outcome),
                 *staying(module, request, outcome.t, outcome.x[:, :n_x])]
 
     def _cancelling(self, module: Module, request: Request, outcome: Outcome, start: np.ndarray, steps: Callable[[], Outcome],
@@ -174,14 +174,14 @@ def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Seq
     t, x = outcome.t, outcome.x[:, :metadata.sizes.x]
     inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), len(metadata.inputs)))
     signs = np.sign(module.evaluate("switches", t, x, request.p, inputs))
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for k, jump in enumerate(metadata.switches):
         for row in np.flatnonzero(signs[1:, k] * signs[:-1, k] <= 0)[:1]:
             J = module.jacobian(t[row], x[row], request.p, inputs[row], ["params", "inputs"], "switches")
             by = np.hstack([np.asarray(J.params)[k], np.asarray(J.inputs)[k]])
             known = dict(zip((*metadata.parameters, *metadata.inputs), by, strict=True))
-            found |= {name: jump.surface for name in asked if known[name] and name not in found}
-    return found
+            result |= {name: jump.surface for name in asked if known[name] and name not in result}
+    return result
 
 
 def _depend_on_state(request: Request) -> set[int]:
@@ -264,35 +264,35 @@ def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
         faults.append(f"sensitivities is {shown(given)}; pass a list of parameters, inputs and initial values, such as "
                       f"[{parameter}'{metadata.x[0]}(0)']")
         return {}
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     constant = {*metadata.parameters, *metadata.inputs}
     for one in given:
         name = name_of(one) if not isinstance(one, str) else one
         initial = _INITIAL.fullmatch(name) if isinstance(name, str) and name.endswith(")") else None
-        if name in found:
+        if name in result:
             faults.append(f"sensitivities name {name} twice; leave one out")
         elif initial and initial["name"].strip() in metadata.x:
-            found[name] = initial["name"].strip()
+            result[name] = initial["name"].strip()
         elif isinstance(name, str) and name in constant:
-            found[name] = ""
+            result[name] = ""
         else:
             faults.append(_unknown(module, name))
-    return found
+    return result
 
 
 def _given_starts(module: Module, given: Any) -> dict[str, np.ndarray]:
     """Derivatives of the start by name, (n_x,) each, of a mapping; of a list none."""
     if not isinstance(given, Mapping):
         return {}
-    n_x, found = module.metadata.sizes.x, {}
+    n_x, result = module.metadata.sizes.x, {}
     for key, value in given.items():
         what = f"the derivative of the start by {name_of(key)}"
         row = real_of(value, module.name, f"{what} must be numbers")
         if row.shape != (n_x,) or not np.isfinite(row).all():
             raise ArgumentError(f"{module.name}: sensitivities give {shown(value)} as {what}; pass {n_x} finite "
                                 f"numbers, those of {', '.join(module.metadata.x)}")
-        found[str(name_of(key))] = np.array(row, dtype=float)
-    return found
+        result[str(name_of(key))] = np.array(row, dtype=float)
+    return result
 
 
 def _unknown(module: Module, name: Any) -> str:

@@ -65,16 +65,16 @@ class ShortSteps:
         if tried.interrupted:
             raise KeyboardInterrupt
         try:
-            found = self._entry(tried)
-            slides = "" if found is None else self._slides(tried, found[0])
+            result = self._entry(tried)
+            slides = "" if result is None else self._slides(tried, result[0])
         except (SymdynError, np.linalg.LinAlgError):
             return "", False
-        if found is None:
+        if result is None:
             return "", False
         self.warned = True
         if slides:
             return slides, True
-        k, length, jump = found
+        k, length, jump = result
         names, n = self.module.metadata.x, self.request.n_state
         state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x[:n], strict=True))
         message = (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter "
@@ -84,12 +84,12 @@ class ShortSteps:
                    "is stopped with its name")
         return message, False
 
-    def _entry(self, found: Outcome) -> tuple[int, float, float] | None:
+    def _entry(self, result: Outcome) -> tuple[int, float, float] | None:
         """The entry whose rate goes to and fro most, by its tolerance; the mean step; how far it goes."""
         n, request = self.request.n_state, self.request
-        if len(found.t) < self.tried // 2:
+        if len(result.t) < self.tried // 2:
             return None
-        t, x = found.t, found.x[:, :n]
+        t, x = result.t, result.x[:, :n]
         span, tolerated = t[-1] - t[0], request.atol[:n] + request.rtol * np.abs(x).max(axis=0)
         powers = np.vander((t - t[0]) / span, 4)
         missed = np.quantile(np.abs(x - powers @ np.linalg.lstsq(powers, x, rcond=None)[0]), MOST, axis=0)
@@ -104,10 +104,10 @@ class ShortSteps:
         # What goes to and fro must be what the errors of steps are about.
         return (k, step, float(ways[:, k].max())) if weight[k] > 1e-3 else None
 
-    def _slides(self, found: Outcome, k: int) -> str:
+    def _slides(self, result: Outcome, k: int) -> str:
         """What to say where the motion slides along a jump that entry k passes; "" where it does not."""
-        n, middle = self.request.n_state, len(found.t) // 2
-        t, x = found.t, found.x[:, :n]
+        n, middle = self.request.n_state, len(result.t) // 2
+        t, x = result.t, result.x[:, :n]
         span = t[-1] - t[0]
         powers = np.vander((t - t[0]) / span, 4)
         cubic = np.linalg.lstsq(powers, x, rcond=None)[0]

@@ -53,8 +53,8 @@ class SlipBegins:
         f = rate(t, x)
         for _ in range(GUESSES):
             ahead = x + after / 2 * (f + rate(t + after, x + after * f))
-            found = slips(t + after, ahead)
-            slip = min(float(found[k] @ d) for k, d in self.directions.items())
+            result = slips(t + after, ahead)
+            slip = min(float(result[k] @ d) for k, d in self.directions.items())
             if slip > LARGER * wanted and after > shortest:
                 after = max(shortest, after * 2 * wanted / slip)
             elif slip >= wanted or after >= most or slip < -wanted:

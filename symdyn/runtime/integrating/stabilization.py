@@ -104,7 +104,7 @@ class Projector:
         needed = ("position_correction", "velocity_correction", "violation",
                   *[name for name in ("reset_directions",) if name in module.functions])
         for name in needed if self.n_c else ():
-            evaluator = self._evaluators[name] = module.unit("rhs").evaluator(name)
+            evaluator = self._evaluators[name] = module.library("rhs").evaluator(name)
             evaluator.set_params(params)
 
     def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -174,14 +174,14 @@ class Projector:
         own = np.diag(directions[:, places]) * factors[places]
         # What would take the others a million times as far is held by the constraints.
         free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
-        found = np.zeros((n, *gaps.shape[1:]))
-        found[free] = _multipliers(directions[free][:, np.array(places)[free]].T, gaps[free])
-        return found
+        result = np.zeros((n, *gaps.shape[1:]))
+        result[free] = _multipliers(directions[free][:, np.array(places)[free]].T, gaps[free])
+        return result
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
         """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
-        found = self(t, x)
-        change = np.abs(found - x)
+        result = self(t, x)
+        change = np.abs(result - x)
         middle = self.n_q + self.n_u
         rounding = np.zeros(len(x))
         for part in (slice(0, self.n_q), slice(self.n_q, middle)):
@@ -189,7 +189,7 @@ class Projector:
         moved = bool((change > 1e-3 * tolerated + rounding).any())
         self.n_steps += moved
         self.largest = np.maximum(self.largest, [np.linalg.norm(change[:self.n_q]), np.linalg.norm(change[self.n_q:middle])])
-        return found, moved
+        return result, moved
 
     @property
     def corrections(self) -> Corrections:
@@ -235,14 +235,14 @@ class Projector:
             raise ProjectionFailed(f"no way back onto the constraints: {error}") from None
 
 
-class Watch:
+class DriftCheck:
     """Looks whether Baumgarte's method still holds the constraints."""
 
     def __init__(self, module: Module, params: np.ndarray) -> None:
         self.module = module
         self.n_state: int = module.metadata.sizes.x
         self.length = length(module, params)
-        self.evaluator = module.unit("rhs").evaluator("violation")
+        self.evaluator = module.library("rhs").evaluator("violation")
         self.evaluator.set_params(params)
 
     def __call__(self, t: float, x: np.ndarray) -> str:
@@ -282,8 +282,8 @@ def _multipliers(G: np.ndarray, gaps: np.ndarray) -> np.ndarray:
     if not len(gaps):
         return gaps
     factors = 1 / np.sqrt(np.diag(G))
-    found: np.ndarray = (factors * np.linalg.lstsq(G * np.outer(factors, factors), (factors * gaps.T).T, rcond=1e-10)[0].T).T
-    return found
+    result: np.ndarray = (factors * np.linalg.lstsq(G * np.outer(factors, factors), (factors * gaps.T).T, rcond=1e-10)[0].T).T
+    return result
 
 
 def chosen_gain(trial: Callable[[], np.ndarray], span: tuple[float, float]) -> float:

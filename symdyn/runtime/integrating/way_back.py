@@ -48,8 +48,8 @@ class Feedback:
 
     def __init__(self, module: Module, inputs: Inputs, carried: Sequence[str]) -> None:
         self._given = inputs
-        self._inputs = [place for places, *_ in inputs.gradients for place in places]
-        self.names = [module.metadata.inputs[place] for place in self._inputs]
+        self._inputs = [index for places, *_ in inputs.gradients for index in places]
+        self.names = [module.metadata.inputs[index] for index in self._inputs]
         self.places = np.array([carried.index(name) for name in self.names if name in carried], dtype=ctypes.c_long)
 
     def slopes(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -97,8 +97,8 @@ class Way:
         self.module, self.request, self.carried, self.room = module, request, tuple(carried), room
         self.method, self.breaks, self.outer = method, breaks, outer
         self.feedback = Feedback(module, request.inputs, self.carried)
-        unit: Any = module.unit(RightSide(method=method, adjoint=tuple(carried)))
-        self.unit, self.run = unit, Run(unit, request)
+        library: Any = module.library(RightSide(method=method, adjoint=tuple(carried)))
+        self.library, self.run = library, Run(library, request)
         tableau = method_of(method).tableau
         assert tableau is not None
         self.stages = s = tableau.n_stages
@@ -133,7 +133,7 @@ class Way:
                 self.run.restore(self.kept[k])
                 self._record(steps)
             value += self._back(self.steps.get(k, steps), times, states, integral, weights)
-        if self.request.stabilization.way == "projection" and "corrected_weights" in self.unit.metadata.shapes:
+        if self.request.stabilization.way == "projection" and "corrected_weights" in self.library.metadata.shapes:
             # The start is put onto the constraints, too.
             begin = self.request.span[0]
             row = self.weights("corrected_weights", begin, self.start, weights[:self.n_x])
@@ -143,12 +143,12 @@ class Way:
 
     def weights(self, name: str, t: float, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """An adjoint at a state: from weights (n_x,) to those of x and of what is carried, (n_x + n_carried,)."""
-        evaluator = self.unit.evaluator(name)
+        evaluator = self.library.evaluator(name)
         evaluator.set_params(self.request.p)
         inputs = self.request.inputs.rows(np.array([t]), x[None, :])[0]
-        found = np.array(evaluator.one(t, x, inputs if len(inputs) else None, weights.copy()))
-        self.feedback.fold(t, x, found)
-        return found
+        result = np.array(evaluator.one(t, x, inputs if len(inputs) else None, weights.copy()))
+        self.feedback.fold(t, x, result)
+        return result
 
     def _forth(self, integral: Integral | None) -> _Steps:
         """To the end, with checkpoints; room for the steps of a stretch."""
@@ -197,7 +197,7 @@ class Way:
         """Try as many steps as a stretch has, and keep those that are accepted; the status."""
         written = ctypes.c_long(0)
         with self.run.guard:
-            status = self.unit.function("simulation_record")(
+            status = self.library.function("simulation_record")(
                 self.run.address, ctypes.c_long(self.stretch), ctypes.c_long(len(steps.t)),
                 *[ctypes.c_void_p(a.ctypes.data) for a in (steps.t, steps.h, steps.x, steps.slopes)], ctypes.byref(written))
         steps.n = written.value
@@ -207,7 +207,7 @@ class Way:
               weights: np.ndarray) -> float:
         """Carry the weights back over the steps of a stretch; its part of the integral. times, states: room for the stages."""
         n = steps.n
-        self.unit.function("simulation_stages")(
+        self.library.function("simulation_stages")(
             ctypes.c_long(n), *_pointers(self.A, self.c, steps.t, steps.h, steps.x, steps.slopes, times, states))
         if not n or (integral is None and self.breaks is None):
             self._over(steps, 0, n, times, states, None, weights)
@@ -258,7 +258,7 @@ class Way:
         times, states = times[begin:end], states[begin:end]
         feedback = self.feedback.slopes(times.ravel(), states.reshape(-1, self.n_x)) if len(places) else None
         with self.run.guard:
-            reason = self.unit.function("simulation_back")(
+            reason = self.library.function("simulation_back")(
                 ctypes.byref(self.run.problem), ctypes.c_long(end - begin),
                 *_pointers(self.A, self.b, steps.h[begin:], steps.x[begin + 1:], times, states, of_x, of_others),
                 ctypes.c_long(len(places)), *_pointers(places, feedback, weights))
@@ -266,7 +266,7 @@ class Way:
             raise self.run.trouble[0]
         if reason:
             raise EvaluationError(f"{self.module.name}: the derivatives along the motion cannot be evaluated: "
-                                  f"{self.unit.reason(int(reason))}")
+                                  f"{self.library.reason(int(reason))}")
         self._note(steps, sum(a.nbytes for a in (times, states, of_x, of_others, feedback) if a is not None))
 
     def _finer(self, steps: _Steps, begin: int, end: int, integral: Integral | None, weights: np.ndarray) -> float:

@@ -44,22 +44,22 @@ def unaffected(module: Module, request: Request, names: Sequence[str], t: np.nda
             for other in (lambda value: 1.5 * value, lambda value: value + 1.0):
                 p, given = request.p.copy(), inputs.copy()
                 if name in metadata.parameters:
-                    place = metadata.parameters.index(name)
-                    p[place] = other(p[place])
+                    index = metadata.parameters.index(name)
+                    p[index] = other(p[index])
                 else:
-                    place = metadata.inputs.index(name)
-                    given[:, place] = other(given[:, place])
+                    index = metadata.inputs.index(name)
+                    given[:, index] = other(given[:, index])
                 if not (np.abs(module.evaluate(function, t, x, p, given) - here) <= size).all():
                     return False
         return True
 
-    found = []
+    result = []
     for name in names:
         try:
-            found += [name] if stays(name) else []
+            result += [name] if stays(name) else []
         except EvaluationError:
             continue
-    return found
+    return result
 
 
 def _sizes(values: np.ndarray, groups: Sequence[int]) -> np.ndarray:

@@ -85,7 +85,7 @@ def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.
 
 def _compliant(solution: Solution) -> dict[str, ContactMotion]:
     """Compliant contacts: what they do follows from the state alone."""
-    records, found, first = solution.module.metadata.compliant, {}, 0
+    records, result, first = solution.module.metadata.compliant, {}, 0
     values = solution.rows(COMPLIANT).reshape(len(solution.t), -1) if records else np.zeros((len(solution.t), 0))
     for record in records:
         gap, slow = values[:, first], values[:, first + 1]
@@ -95,9 +95,9 @@ def _compliant(solution: Solution) -> dict[str, ContactMotion]:
         mode = np.where(gap > 0, OPEN, np.where(still, STICKING, SLIDING)).astype(object)
         changes = [0, *(1 + np.flatnonzero(mode[1:] != mode[:-1]))] if len(mode) else []
         none = np.zeros((0, record.rows))
-        found[record.name] = ContactMotion(mode, gap, force, slip, np.zeros_like(force), Impacts(np.zeros(0), none, none, none),
-                                           np.zeros(0), tuple((float(solution.t[k]), str(mode[k])) for k in changes))
-    return found
+        result[record.name] = ContactMotion(mode, gap, force, slip, np.zeros_like(force), Impacts(np.zeros(0), none, none, none),
+                                            np.zeros(0), tuple((float(solution.t[k]), str(mode[k])) for k in changes))
+    return result
 
 
 def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
@@ -109,22 +109,22 @@ def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
     values = solution.rows(CONTACTS).reshape(len(solution.t), -1)
     k = len(records)
     slips, forces = values[:, 4 * k:4 * k + n], values[:, 4 * k + 2 * n:4 * k + 3 * n]
-    found = {}
-    for place, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
+    result = {}
+    for index, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
         own = list(rows)
         hits = [one for one in impacts if one.impulses[own].any()]
         t = np.array([one.t for one in hits])
         of_hits = Impacts(t, *[np.array([getattr(one, what)[own] for one in hits]).reshape(-1, len(own))
                                for what in ("impulses", "before", "after")])
-        modes = [_called(phase.modes[place], record) for phase in phases]
+        modes = [_called(phase.modes[index], record) for phase in phases]
         changes = [(phase.t, mode) for i, (phase, mode) in enumerate(zip(phases, modes, strict=True))
                    if i == 0 or modes[i - 1] != mode]
         summed = np.vstack([np.zeros(len(own)), np.cumsum(of_hits.impulse, axis=0)])
-        found[record.name] = ContactMotion(
-            np.array(modes, dtype=object)[row_phases] if modes else np.zeros(0, dtype=object), values[:, 4 * place],
+        result[record.name] = ContactMotion(
+            np.array(modes, dtype=object)[row_phases] if modes else np.zeros(0, dtype=object), values[:, 4 * index],
             forces[:, own], slips[:, own[record.normal:]], summed[np.searchsorted(t, solution.t, side="left")], of_hits,
-            np.array([one.rest[place] for one in impacts if place in one.rest]), tuple(changes))
-    return found
+            np.array([one.rest[index] for one in impacts if index in one.rest]), tuple(changes))
+    return result
 
 
 def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactMotion]:
@@ -134,23 +134,23 @@ def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactM
     values = solution.rows(GAPS).reshape(len(solution.t), -1)
     modes, touched = modes_of(stepped, n), stepped.touched
     before = np.maximum(stepped.row - 1, 0)
-    found = {}
-    for place, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
-        own = np.flatnonzero((touched.b < 0) & (touched.a == place))
+    result = {}
+    for index, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
+        own = np.flatnonzero((touched.b < 0) & (touched.a == index))
         impulses = np.zeros((n_steps, record.rows))
         impulses[touched.step[own]] = touched.values[own, 4:4 + record.rows]
         summed = np.vstack([np.zeros(record.rows), np.cumsum(impulses, axis=0)])
-        mode, none = modes[:, place], np.zeros((len(solution.t), record.rows))
+        mode, none = modes[:, index], np.zeros((len(solution.t), record.rows))
         fresh = own[(touched.values[own, 4] > 0) & (np.append(0, mode)[touched.step[own]] == 0) & record.normal]
         after, of_hits, before_hits = (touched.values[fresh, k:k + record.rows] for k in (1, 4, 7))
         hits = Impacts(stepped.t[touched.step[fresh]], of_hits, before_hits, after)
         changes = [k for k in range(n_steps) if k == 0 or mode[k] != mode[k - 1]]
         names = np.array([_called(name if record.normal or name != OPEN else STICKING, record) for name in MODES], dtype=object)
-        found[record.name] = ContactMotion(
-            names[mode][before] if n_steps else np.array([names[0]] * len(solution.t), dtype=object), values[:, 4 * place],
+        result[record.name] = ContactMotion(
+            names[mode][before] if n_steps else np.array([names[0]] * len(solution.t), dtype=object), values[:, 4 * index],
             (impulses / stepped.h[:, None])[before] if n_steps else none, values[:, [4 * n + r for r in rows[record.normal:]]],
             summed[stepped.row], hits, np.zeros(0), tuple((float(stepped.t[k]), str(names[mode[k]])) for k in changes))
-    return found
+    return result
 
 
 class GroupMotion(NamedTuple):
@@ -176,7 +176,7 @@ class GroupMotion(NamedTuple):
 
 def group_motions(solution: Solution, stepped: Stepped) -> dict[str, GroupMotion]:
     """Every group of contacts by name."""
-    touched, found, first, plane = stepped.touched, {}, 0, 0
+    touched, result, first, plane = stepped.touched, {}, 0, 0
     groups = solution.module.metadata.contact_groups
     n_bodies = sum(len(group.bodies) for group in groups)
     row_of = np.full(len(stepped.h), -1)
@@ -189,10 +189,10 @@ def group_motions(solution: Solution, stepped: Stepped) -> dict[str, GroupMotion
         other = np.where(b >= n_bodies, b - n_bodies - plane + len(group.bodies), b - first)
         forces = values[:, 4:7] / stepped.h[touched.step[own], None]
         modes = np.array(MODES, dtype=object)[touched.state[own]]
-        found[group.name] = GroupMotion(rows[own], touched.a[own] - first, other, modes, values[:, 0], forces[:, 0],
-                                        np.linalg.norm(forces[:, 1:], axis=1), np.linalg.norm(values[:, 2:4], axis=1))
+        result[group.name] = GroupMotion(rows[own], touched.a[own] - first, other, modes, values[:, 0], forces[:, 0],
+                                         np.linalg.norm(forces[:, 1:], axis=1), np.linalg.norm(values[:, 2:4], axis=1))
         first, plane = end, plane + group.planes
-    return found
+    return result
 
 
 def _called(mode: str, record: ContactRecord) -> str:

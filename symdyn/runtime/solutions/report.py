@@ -66,7 +66,7 @@ def _times(solution: Solution) -> list[tuple[str, float]]:
     t = solution.t
     if not len(t):
         return []
-    found = [("start", float(t[0]))]
+    result = [("start", float(t[0]))]
     if len(t) > 1:
         centres = solution.rows("positions").reshape(len(t), -1, 3) if "positions" in solution.module.functions else None
         if centres is not None and centres.shape[1] and np.isfinite(centres).all():
@@ -74,9 +74,9 @@ def _times(solution: Solution) -> list[tuple[str, float]]:
             moved = np.linalg.norm(middle - middle[0], axis=1)
             far = int(moved.argmax())
             if 0 < far < len(t) - 1 and moved[far] > _SEEN * np.ptp(centres, axis=(0, 1)).max():
-                found.append(("farthest from the start", float(t[far])))
-        found.append(("end", float(t[-1])))
-    return found
+                result.append(("farthest from the start", float(t[far])))
+        result.append(("end", float(t[-1])))
+    return result
 
 
 def _generated(solution: Solution) -> str:

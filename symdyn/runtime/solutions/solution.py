@@ -127,8 +127,8 @@ class Solution:
             raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
                                 f"its state was asked for at t = {outside.flat[0]:.9g} s")
         times, places = np.unique(asked, return_inverse=True)
-        found = self._repeat(times)
-        return found[places.reshape(asked.shape)]
+        result = self._repeat(times)
+        return result[places.reshape(asked.shape)]
 
     def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
         """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
@@ -349,8 +349,8 @@ class Solution:
         >>> x.shape, columns.shape
         ((2, 2), (2, 2, 2))
         """
-        found = self._at(t)
-        return found[..., :self._sizes.x], found[..., self._sizes.x:].reshape(*found.shape[:-1], -1, self._sizes.x)
+        result = self._at(t)
+        return result[..., :self._sizes.x], result[..., self._sizes.x:].reshape(*result.shape[:-1], -1, self._sizes.x)
 
     def states_and_inputs(self, t: Times) -> tuple[np.ndarray, np.ndarray]:
         """States at any times of the motion, as by a call, (..., n_x), with the inputs there, (..., n_in).
@@ -375,8 +375,8 @@ class Solution:
         held = () if self._inputs.record is None else self._inputs.record.times
         inside = np.concatenate([[one.t for one in self._happened], self._inputs.stops((self.t[0], self.t[-1])), held])
         first, last = sorted((self.t[0], self.t[-1]))
-        found = np.unique(np.append(inside[(inside > first) & (inside < last)], [first, last]))
-        return found if self.t[0] <= self.t[-1] else found[::-1]
+        result = np.unique(np.append(inside[(inside > first) & (inside < last)], [first, last]))
+        return result if self.t[0] <= self.t[-1] else result[::-1]
 
     @property
     def jumps(self) -> np.ndarray:
@@ -385,8 +385,8 @@ class Solution:
         >>> sd.systems.pendulum().compile(backend="numpy").simulate((0, 1)).jumps.shape
         (0,)
         """
-        found = [one.t for one in self._happened if not np.array_equal(one.before, one.after)]
-        return np.unique(np.array([*found, *[one.t for one in self._impacts]], dtype=float))
+        result = [one.t for one in self._happened if not np.array_equal(one.before, one.after)]
+        return np.unique(np.array([*result, *[one.t for one in self._impacts]], dtype=float))
 
     def lqr(self, Q: Weights, R: Weights, Qf: Weights | None = None) -> Tracking:
         """The time-varying linear-quadratic regulator about the motion: inputs of least integral of dx^T Q dx + din^T R din and
@@ -816,13 +816,13 @@ class Solution:
             return self._single_rows(name)
 
     def _single_rows(self, name: str) -> np.ndarray:
-        found = np.full((len(self.t), *self.module.shape(name)), np.nan)
+        result = np.full((len(self.t), *self.module.shape(name)), np.nan)
         inputs = self.inputs
         for k, (t, x) in enumerate(zip(self.t, self.x, strict=True)):
             with contextlib.suppress(EvaluationError):
                 p = self._phases[self._row_phases[k]].p if self._phases else self.params
-                found[k] = self.module.evaluate(name, t, x, p, inputs[k])
-        return found
+                result[k] = self.module.evaluate(name, t, x, p, inputs[k])
+        return result
 
     def _rows(self, name: str) -> np.ndarray:
         if name in OF_FORCES and self.module.metadata.contact_groups:

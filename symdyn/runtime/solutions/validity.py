@@ -45,14 +45,14 @@ def watched(module: Module, values: Any, t: np.ndarray | None = None) -> list[Wa
     there = np.isfinite(rows).all(axis=1)
     if not there.any():
         return []
-    found = []
+    result = []
     for one, column in zip(about, rows[there].T, strict=True):
         if one.summed:
             if t is None:
                 continue
             column = np.array([np.trapezoid(column, t[there])])
-        found.append(Watched(one.label, one.least, one.most, float(column.min()), float(column.max()), one.message))
-    return found
+        result.append(Watched(one.label, one.least, one.most, float(column.min()), float(column.max()), one.message))
+    return result
 
 
 def warn(module: Module, values: Any, when: str, level: int, t: np.ndarray | None = None) -> None:

@@ -61,21 +61,21 @@ def symdyn_cut_cube(order, e, one, shares):
         Q[k].append(Q[3][k])
     Q[3].append(c * Q[0][3] - a * Q[1][3] - b * Q[2][3])
     sign = [1, *(-1 if v > 0 else 1 for v in e[1:])]
-    place = [(0, x, y, z).index(k) for k in range(4)]
+    index = [(0, x, y, z).index(k) for k in range(4)]
     if order == 0:
         # Under P the cube is wet from -1/2 to h, under the top altogether.
         local = [*(Q[k][3] + Q[0][k] / 2 + top[k] for k in range(3)), Q[3][3] / 2 - Q[0][0] / 8]
-        return [sign[i] * local[place[i]] for i in range(4)]
+        return [sign[i] * local[index[i]] for i in range(4)]
     out = []
     for i in range(4):
         for j in range(i, 4):
-            p, q, factor = place[i], place[j], sign[i] * sign[j] / C
+            p, q, factor = index[i], index[j], sign[i] * sign[j] / C
             if order == 1:
                 out.append(factor * Q[p][q])
                 continue
             for k in range(j, 4):
                 # As the water rises, so does the cut, by 1/C, and its edges move along x by 1/A.
-                r = place[k]
+                r = index[k]
                 rising = ((Q[q][r] if p == 3 else 0) + (Q[p][r] if q == 3 else 0) + (Q[p][q] if r == 3 else 0)) / C
                 for rate, end in edges:
                     rising += end[p] * end[q] * end[r] * rate

@@ -1,4 +1,4 @@
-"""Solvers for M x + C^T lam = f, C x = d; see Saddle and Multipliers in symdyn.tape.kernels.
+"""Solvers for M x + C^T lam = f, C x = d; see Saddle and Multipliers in symdyn.tape.intrinsics.
 
 `xp` is the arithmetic: NumPy, or what has its names for other numbers. Arrays have the entries of vectors and matrices first, and
 then states, of which there may be none.

@@ -30,5 +30,5 @@ def named(asked: Iterable[str]) -> list[str]:
 
 def peers(name: str) -> tuple[Peer, ...]:
     """The peers of a name; nothing of theirs is imported before `available` or `prepare` is called."""
-    found: tuple[Peer, ...] = importlib.import_module(f"{__name__}.{_HOME[name]}").PEERS
-    return found
+    result: tuple[Peer, ...] = importlib.import_module(f"{__name__}.{_HOME[name]}").PEERS
+    return result

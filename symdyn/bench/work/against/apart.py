@@ -47,12 +47,12 @@ class Here:
     def __init__(self, runners: Sequence[Runner]) -> None:
         self.runners = list(runners)
 
-    def timed(self, place: int, tolerance: float, repeats: int, deadline: float = math.inf) -> Timed:
+    def timed(self, index: int, tolerance: float, repeats: int, deadline: float = math.inf) -> Timed:
         """A pass of runs until one of the times; deadline: of time.perf_counter, see `timing.one_pass`."""
         ran: list[Ran] = []
 
         def run() -> float:
-            ran[:] = [self.runners[place](tolerance)]
+            ran[:] = [self.runners[index](tolerance)]
             return ran[0][0]
 
         seconds = one_pass(run, repeats, deadline)
@@ -94,9 +94,9 @@ class Apart:
             self.close()
             raise
 
-    def timed(self, place: int, tolerance: float, repeats: int, deadline: float = math.inf) -> Timed:
+    def timed(self, index: int, tolerance: float, repeats: int, deadline: float = math.inf) -> Timed:
         """As of Here."""
-        return self._asked("timed", (place, tolerance), place, tolerance, repeats, deadline)  # type: ignore[no-any-return]
+        return self._asked("timed", (index, tolerance), index, tolerance, repeats, deadline)  # type: ignore[no-any-return]
 
     def states(self, tolerance: float, times: np.ndarray) -> tuple[float, np.ndarray]:
         """As of Here."""
@@ -110,23 +110,23 @@ class Apart:
         with contextlib.suppress(BrokenPipeError):  # that it died is reported below
             self.pipe.send((name, arguments))
         allowed = max(_LEAST, rest if key in self.done else _PART * rest)
-        found = self._answer(allowed, f"what it does for a tolerance of {key[1]:g}", Failed)
+        result = self._answer(allowed, f"what it does for a tolerance of {key[1]:g}", Failed)
         self.done.add(key)
-        return found
+        return result
 
     def _answer(self, seconds: float, what: str, fault: type[SymdynError]) -> Any:
         if not self.pipe.poll(max(0.0, seconds)):
             raise self._end(TooLong(f"{what} was not done after {max(0.0, seconds):.2g} s, its part of the budget"))
         try:
-            good, found = self.pipe.recv()
+            good, result = self.pipe.recv()
         except (EOFError, ConnectionResetError):
             wait([self.process.sentinel], _DYING)
             self._end(TooLong("its process was ended"))
             self.gone = fault(f"its process died with code {self.process.exitcode}")
             raise self.gone from None
         if not good:
-            raise fault(found)
-        return found
+            raise fault(result)
+        return result
 
     def close(self) -> None:
         """End the process, and what it started."""

@@ -89,20 +89,20 @@ class Exudyn:
             n = len(built.start)
             _compare(built.state(turns, turns)[n:], module.rhs(0.0, x0, params, built.inputs)[n:], "accelerations at the start")
         else:
-            found = motion(_SHORT * end, 2000, None if self.method in _ORDERS else 1e-12)[2]
+            result = motion(_SHORT * end, 2000, None if self.method in _ORDERS else 1e-12)[2]
             n = len(built.links)
             done = module.simulate(t=np.array([0.0, _SHORT * end]), q=x0[:n], u=x0[n:], params=params, rtol=1e-12)
-            _compare(found - x0, np.concatenate([done.q[-1], done.u[-1]]) - x0, f"changes in a motion of {_SHORT * end:g} s")
+            _compare(result - x0, np.concatenate([done.q[-1], done.u[-1]]) - x0, f"changes in a motion of {_SHORT * end:g} s")
         if self.method not in _ORDERS:
             return lambda tolerance, times=None: motion(end, 1, tolerance, times)
         steps = calibrated(lambda n: motion(end, n)[::2], _ORDERS[self.method])
         return lambda tolerance, times=None: motion(end, steps(tolerance), None, times)
 
 
-def _compare(found: np.ndarray, wanted: np.ndarray, what: str) -> None:
+def _compare(result: np.ndarray, wanted: np.ndarray, what: str) -> None:
     """Raise Unfit unless Exudyn's numbers are ours."""
     size = float(np.linalg.norm(wanted))
-    error = float(np.linalg.norm(found - wanted) / (size if size > _NEAR else 1.0))  # none at all at a start in balance
+    error = float(np.linalg.norm(result - wanted) / (size if size > _NEAR else 1.0))  # none at all at a start in balance
     if not error <= _NEAR:
         raise Unfit(f"{what} differ from ours by {error:.1e}, relative; it is not compared")
 

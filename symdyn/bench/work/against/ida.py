@@ -82,14 +82,14 @@ def with_slopes(equations: Any) -> Any:
     def slopes(names: list[str]) -> np.ndarray:
         entries = equations.quantity("residual")
         leaves = {leaf.args[1]: leaf for leaf in equations.tape("residual").inputs}
-        found = np.zeros((len(entries), len(names)), dtype=object)
+        result = np.zeros((len(entries), len(names)), dtype=object)
         there = [k for k, name in enumerate(names) if name in leaves]
-        found[:, there] = jacobian(recorder, tuple(entries), [leaves[names[k]] for k in there], "forward")
-        return found
+        result[:, there] = jacobian(recorder, tuple(entries), [leaves[names[k]] for k in there], "forward")
+        return result
 
     state = [s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]
     given = residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
-    return replace(equations, otherwise=None, again=None, quantities={
+    return replace(equations, singular_fallback=None, again=None, quantities={
         **equations.quantities, "residual_x": lambda: slopes(state), "residual_rates": lambda: slopes(given)})
 
 

@@ -86,7 +86,7 @@ def tree_of(system: Any, equations: Any, params: np.ndarray) -> Tree:
     if system is None:
         raise Unfit("it is known by its equations alone; the program takes bodies and joints")
     model = system.check()
-    _refuse(model, equations.symbols)
+    _reject(model, equations.symbols)
     reader = numbers_of(model, equations, params)
     owners: dict[int, tuple[int, np.ndarray, np.ndarray]] = {-1: (-1, np.eye(3), np.zeros(3))}
     links: list[Link] = []
@@ -113,7 +113,7 @@ def tree_of(system: Any, equations: Any, params: np.ndarray) -> Tree:
     return Tree(tuple(links), reader.array(model.gravity).ravel(), np.array(order), model.planar)
 
 
-def _refuse(model: Any, symbols: Any) -> None:
+def _reject(model: Any, symbols: Any) -> None:
     """Raise Unfit for what is no tree of joints with one degree of freedom."""
     for what, given in (("closed loops", model.loops), ("constraints", model.constraints), ("extra states", model.states),
                         ("a moving ground", model.ground_motion)):
@@ -195,8 +195,8 @@ def check_accelerations(tree: Tree, accelerations: Callable[[np.ndarray, np.ndar
     for _ in range(_STATES):
         x = random.uniform(-1, 1, 2 * n)
         wanted = module.rhs(0.0, x, params, inputs)[n:]
-        found = tree.join(np.zeros(n), accelerations(*tree.split(x)))[n:]
-        error = float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        result = tree.join(np.zeros(n), accelerations(*tree.split(x)))[n:]
+        error = float(np.linalg.norm(result - wanted) / np.linalg.norm(wanted))
         if not error <= _NEAR:
             raise Unfit(f"accelerations of {program} differ from ours by {error:.1e}, relative; it is not compared")
 

@@ -61,7 +61,7 @@ def planar_of(system: Any, equations: Any, params: np.ndarray, x0: np.ndarray) -
         raise Unfit("it is known by its equations alone; the program takes bodies and joints")
     model = system.check()
     read = numbers_of(model, equations, params)
-    _refuse(model, equations)
+    _reject(model, equations)
     n = len(model.coordinates)
     module, inputs = equations.compile(), read.inputs
     centres = module.evaluate("positions", 0.0, x0, params, inputs).reshape(len(model.bodies), -1)[:, :2]
@@ -103,7 +103,7 @@ def planar_of(system: Any, equations: Any, params: np.ndarray, x0: np.ndarray) -
                   tuple(owner[q] for q in model.coordinates), np.array(x0[:n], dtype=float), inputs)
 
 
-def _refuse(model: Any, equations: Any) -> None:
+def _reject(model: Any, equations: Any) -> None:
     """Raise Unfit for what is no planar mechanism of hinged bodies."""
     for what, given in (("motion in space", not model.planar), ("constraints by formula", model.constraints),
                         ("extra states", model.states), ("a moving ground", model.ground_motion)):

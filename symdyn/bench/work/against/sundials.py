@@ -21,7 +21,7 @@ from symdyn.bench.work.against.walk import constant_inputs
 from symdyn.errors import CompilerNotFound
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.building.library import CUnit, Frame
+from symdyn.runtime.building.library import CLibrary, Frame
 
 INSTALL = "scikit-sundae is not installed; run: pip install 'symdyn[peers]'"
 _PARTS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode", "ida")
@@ -115,12 +115,12 @@ def _libraries() -> dict[str, Path]:
     assert spec is not None and spec.origin is not None
     folder = Path(spec.origin).parent
     places = [folder.parent / "scikit_sundae.libs", folder / ".dylibs", *folder.parents[2].glob("lib")]
-    found = {part: path for part in _PARTS for place in places for path in sorted(place.glob(f"libsundials_{part}[-.]*"))[:1]}
-    missing = [part for part in _PARTS if part not in found]
+    result = {part: path for part in _PARTS for index in places for path in sorted(index.glob(f"libsundials_{part}[-.]*"))[:1]}
+    missing = [part for part in _PARTS if part not in result]
     if missing:
         raise Unfit(f"the libraries libsundials_{missing[0]} and so on were not found next to scikit-sundae; take its wheel: "
                     "pip install scikit-sundae")
-    return found
+    return result
 
 
 class _Given(ctypes.Structure):
@@ -152,10 +152,10 @@ class Sundials:
         n = source.metadata.shapes[functions[0]][0]
         text = next(iter(source.files.values())) + "".join(_TEXTS[f] if k else _HEAD + _TEXTS[f] for k, f in enumerate(
             functions)).format(name=source.metadata.name, n=n, n_x=sizes.x, **calls)
-        self.unit = CUnit(text, source.metadata, require_compiler())
+        self.library = CLibrary(text, source.metadata, require_compiler())
         self.p, self.c = np.zeros(max(1, sizes.p)), np.zeros(max(1, source.metadata.n_c))
         self.p[:len(params)] = params
-        self.unit.prologue(self.p, self.c)
+        self.library.prologue(self.p, self.c)
         self.inputs = np.array([*constant_inputs(equations).values(), 0.0])
         self.out = np.zeros(2 * n * n)
         self.frame = Frame()
@@ -179,7 +179,7 @@ class Sundials:
 
     def callback(self, name: str) -> Any:
         """The address of a compiled callback."""
-        return ctypes.cast(self.unit.function(f"sundials_{name}"), ctypes.c_void_p)
+        return ctypes.cast(self.library.function(f"sundials_{name}"), ctypes.c_void_p)
 
     def vector(self, values: np.ndarray) -> Any:
         """A vector on the memory of values (n,), which must stay."""
@@ -198,7 +198,7 @@ class Sundials:
 
         at   state and time, changed by step, which makes one step
         """
-        (x, t), found = at, np.zeros((len(times), len(at[0])))
+        (x, t), result = at, np.zeros((len(times), len(at[0])))
         row, k = np.zeros(len(x)), 0
         y, last = self.vector(row), clock.perf_counter() + LONGEST
         try:
@@ -208,10 +208,10 @@ class Sundials:
                 step()
                 while k < len(times) and times[k] <= t.value:
                     self(part, name, memory, float(times[k]), 0, y)
-                    found[k], k = row, k + 1
+                    result[k], k = row, k + 1
         finally:
             self("core", "N_VDestroy", y)
-        return found
+        return result
 
     def count(self, part: str, name: str, memory: Any) -> int:
         """One of an integrator's counters."""

@@ -9,7 +9,7 @@ import pytest
 
 from symdyn import systems
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.timing import loops as kernel
+from symdyn.timing import loops
 
 
 class FakeTime:
@@ -18,7 +18,7 @@ class FakeTime:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, interrupted: tuple[int, ...]) -> None:
         self.now, self.calls, self.interrupted = 0.0, 0, interrupted
         self.counts: list[int] = []
-        monkeypatch.setattr(kernel, "clock", SimpleNamespace(perf_counter=lambda: self.now))
+        monkeypatch.setattr(loops, "clock", SimpleNamespace(perf_counter=lambda: self.now))
 
     def run(self, n: int, seconds: float) -> None:
         self.now += n * seconds + 0.01 * (self.calls in self.interrupted)
@@ -28,14 +28,14 @@ class FakeTime:
 
 def test_interruptions_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     time = FakeTime(monkeypatch, interrupted=(0, 7, 150))
-    fast, slow = kernel.best_times([lambda n: time.run(n, 1e-7), lambda n: time.run(n, 3e-7)], 20)
+    fast, slow = loops.best_times([lambda n: time.run(n, 1e-7), lambda n: time.run(n, 3e-7)], 20)
     assert (fast, slow) == pytest.approx((1e-7, 3e-7))
     assert time.counts[-4:] == pytest.approx([20_000, 6667] * 2)
 
 
 def test_given_number_of_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
     time = FakeTime(monkeypatch, interrupted=())
-    assert kernel.best_times([lambda n: time.run(n, 1e-7)], 3, loops=5) == pytest.approx([1e-7])
+    assert loops.best_times([lambda n: time.run(n, 1e-7)], 3, loops=5) == pytest.approx([1e-7])
     assert time.counts == [5, 5, 5]
 
 
@@ -43,7 +43,7 @@ def test_given_number_of_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_loop_evaluates_the_right_hand_side() -> None:
     equations = systems.double_pendulum().embedding()
     x = np.array([0.1, 0.2, 0.3, 0.4])
-    loop = kernel.compiled_loop(equations, x)
+    loop = loops.compiled_loop(equations, x)
     loop.run(1)
     assert loop.evaluator.out == pytest.approx(equations.compile(backend="numpy").rhs(0.0, x), rel=1e-12)
     once = loop.evaluator.out.copy()

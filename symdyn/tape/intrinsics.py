@@ -43,7 +43,7 @@ _NAMES = (
 
 
 @dataclass(frozen=True)
-class Kernel:
+class Intrinsic:
     """Of one size. Subclasses say what is computed.
 
     name     in generated code; sizes: what it is called with
@@ -93,7 +93,7 @@ class Kernel:
 
 
 @dataclass(frozen=True)
-class Saddle(Kernel):
+class Saddle(Intrinsic):
     """x of M x + C^T lam = f, C x = d, for sizes (n, m): M symmetric, perhaps singular, the rows of C perhaps dependent.
 
     Values: e, M lower triangle row by row, C row by row, scales of the rows (m) and columns (n) of C, f, d.
@@ -150,7 +150,7 @@ class Saddle(Kernel):
 
 
 @dataclass(frozen=True)
-class Multipliers(Kernel):
+class Multipliers(Intrinsic):
     """lam of C^T lam = g of least norm after scaling, for sizes (n, m): the rows of C perhaps dependent.
 
     Values: C row by row, scales of its rows (m) and columns (n), g. Iterated regularized normal equations,
@@ -203,17 +203,17 @@ def _objects(values: Sequence[Any]) -> np.ndarray:
 def _rows(algorithm: Callable[..., Any], sizes: tuple[int, ...], values: Sequence[Any], bound: float) -> np.ndarray:
     """Results in doubles, states first; NaN where there are none."""
     with np.errstate(all="ignore"):
-        found, failed = algorithm(np, *sizes, symdyn_stacked(values), bound)
-    return np.moveaxis(np.where(failed, np.nan, found), 0, -1)
+        result, failed = algorithm(np, *sizes, symdyn_stacked(values), bound)
+    return np.moveaxis(np.where(failed, np.nan, result), 0, -1)
 
 
 def _precise(algorithm: Callable[..., Any], context: Any, sizes: tuple[int, ...], values: Sequence[Any], bound: Any) -> list[Any]:
     """Results for numbers of an mpmath context. Raises ZeroDivisionError where there are none."""
     root = SimpleNamespace(**{name: getattr(np, name) for name in _NAMES}, sqrt=np.frompyfunc(context.sqrt, 1, 1))
-    found, failed = algorithm(root, *sizes, _objects(values), bound)
+    result, failed = algorithm(root, *sizes, _objects(values), bound)
     if failed:
         raise ZeroDivisionError("the matrix is singular")
-    return [context.convert(v) for v in found]
+    return [context.convert(v) for v in result]
 
 
 def _statements(algorithm: Callable[..., Any], recorder: Any, sizes: tuple[int, ...], values: Sequence[Any],

@@ -13,12 +13,12 @@ import pytest
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.kernels import SMOOTHED, Kernel, Multipliers, Saddle
+from symdyn.tape.intrinsics import SMOOTHED, Intrinsic, Multipliers, Saddle
 from symdyn.tape.node import INPUT, PARAMETER
 from symdyn.tape.passes import specialize
 
@@ -107,42 +107,42 @@ PROBLEMS: dict[str, tuple[Problem, float]] = {
 }
 
 
-def taped(kernel: Kernel, n_values: int, kind: int = INPUT) -> tuple[Tape, list[str]]:
-    """A tape that calls a kernel with leaves."""
+def taped(intrinsic: Intrinsic, n_values: int, kind: int = INPUT) -> tuple[Tape, list[str]]:
+    """A tape that calls an intrinsic with leaves."""
     recorder = Recorder()
     names = [f"v{k}" for k in range(n_values)]
     leaves = [recorder.leaf(name, kind) for name in names]
-    return Tape.of(recorder, solve=np.array(recorder.call(kernel, leaves), dtype=object)), names
+    return Tape.of(recorder, solve=np.array(recorder.call(intrinsic, leaves), dtype=object)), names
 
 
 def unit_of(tape: Tape, names: list[str], backend: str, kind: int = INPUT) -> Any:
     groups: dict[str, list[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
     groups["inputs" if kind == INPUT else "p"] = names
-    content = Content("kernels", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
+    content = Content("intrinsics", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
     source = render(content, backend, standalone=False, integrator=False)
     text = next(iter(source.files.values()))
     if backend == "numpy":
-        return PythonUnit.from_source(text, "kernels")
+        return PythonLibrary.from_source(text, "intrinsics")
     compiler = find_compiler()
     if compiler is None:
         pytest.skip("no C compiler here")
-    return CUnit(text, source.metadata, compiler)
+    return CLibrary(text, source.metadata, compiler)
 
 
-def on_tape(kernel: Kernel, values: np.ndarray) -> np.ndarray:
-    tape, names = taped(kernel, len(values))
+def on_tape(intrinsic: Intrinsic, values: np.ndarray) -> np.ndarray:
+    tape, names = taped(intrinsic, len(values))
     return evaluate_rows(tape, dict(zip(names, values.tolist(), strict=True)), 1)["solve"][0]
 
 
-def precisely(kernel: Kernel, values: np.ndarray) -> np.ndarray:
-    tape, names = taped(kernel, len(values))
+def precisely(intrinsic: Intrinsic, values: np.ndarray) -> np.ndarray:
+    tape, names = taped(intrinsic, len(values))
     found = evaluate(tape, dict(zip(names, map(mpmath.mpf, values.tolist()), strict=True)), 50)["solve"]
     return np.array([float(v) for v in found])
 
 
-def generated(backend: str) -> Callable[[Kernel, np.ndarray], np.ndarray]:
-    def solve(kernel: Kernel, values: np.ndarray) -> np.ndarray:
-        evaluator = unit_of(*taped(kernel, len(values)), backend).evaluator("solve")
+def generated(backend: str) -> Callable[[Intrinsic, np.ndarray], np.ndarray]:
+    def solve(intrinsic: Intrinsic, values: np.ndarray) -> np.ndarray:
+        evaluator = unit_of(*taped(intrinsic, len(values)), backend).evaluator("solve")
         evaluator.set_params(np.zeros(0))
         many = evaluator.many(np.zeros(1), np.zeros((1, 0)), np.array([values, values]), np.zeros((1, 0)))
         one = np.array(evaluator.one(0.0, np.zeros(0), values))
@@ -151,7 +151,7 @@ def generated(backend: str) -> Callable[[Kernel, np.ndarray], np.ndarray]:
     return solve
 
 
-ROUTES: dict[str, Callable[[Kernel, np.ndarray], np.ndarray]] = {
+ROUTES: dict[str, Callable[[Intrinsic, np.ndarray], np.ndarray]] = {
     "rows": on_tape, "precise": precisely, "numpy": generated("numpy"), "c": generated("c")}
 
 
@@ -252,17 +252,17 @@ def test_singular_numbers_are_rejected_alike_when_folded_and_in_generated_code()
     groups = ([singular(seed) for seed in range(300)], True), ([problem(4, 2, seed=seed) for seed in range(300)], False)
     for cases, rejected in groups:
         values = np.array([case.for_saddle for case in cases])
-        kernel = Saddle(cases[0].sizes, "nothing holds a speed")
+        intrinsic = Saddle(cases[0].sizes, "nothing holds a speed")
         found = []
         for row in values:
             try:
-                found.append([float(v) for v in Recorder().call(kernel, row.tolist())])
+                found.append([float(v) for v in Recorder().call(intrinsic, row.tolist())])
             except ZeroDivisionError as error:
                 assert str(error) == "nothing holds a speed"
                 found.append([np.nan] * 4)
         assert (np.isnan(found).all(axis=1) == rejected).all()
         for backend in ["numpy", *(["c"] if find_compiler() else [])]:
-            evaluator = unit_of(*taped(kernel, values.shape[1]), backend).evaluator("solve")
+            evaluator = unit_of(*taped(intrinsic, values.shape[1]), backend).evaluator("solve")
             evaluator.set_params(np.zeros(0))
             for row, one in zip(values, found, strict=True):
                 if rejected:
@@ -317,17 +317,18 @@ def test_derivatives(name: str) -> None:
     given, _ = PROBLEMS[name]
     rng = np.random.default_rng(3)
     x, _ = given.solution()
-    for kernel, values in ((Saddle(given.sizes, ""), given.for_saddle), (Multipliers(given.sizes, ""), given.for_multipliers(x))):
-        tape, names = taped(kernel, len(values))
+    for intrinsic, values in ((Saddle(given.sizes, ""), given.for_saddle),
+                              (Multipliers(given.sizes, ""), given.for_multipliers(x))):
+        tape, names = taped(intrinsic, len(values))
         along = rng.normal(size=len(values)) * np.abs(values)
         n, m = given.sizes
-        scales = 1 + n * (n + 1) // 2 + m * n if isinstance(kernel, Saddle) else m * n
+        scales = 1 + n * (n + 1) // 2 + m * n if isinstance(intrinsic, Saddle) else m * n
         along[scales:scales + m + n] = 0  # no part of the result
-        if isinstance(kernel, Saddle):
+        if isinstance(intrinsic, Saddle):
             along[0] = 0
         else:  # stays in the range of C^T
             C_dot = along[:m * n].reshape(m, n)
-            lam = on_tape(kernel, values)
+            lam = on_tape(intrinsic, values)
             along[-n:] = C_dot.T @ lam + given.C.T @ rng.normal(size=m)
         leaves = {tape.recorder.leaf(name, INPUT): float(v) for name, v in zip(names, along, strict=True) if v}
         derivative = forward(tape.recorder, tape.outputs["solve"].entries, leaves)
@@ -338,7 +339,7 @@ def test_derivatives(name: str) -> None:
             ahead, back = (evaluate(tape, {name: mpmath.mpf(v) + sign * h * mpmath.mpf(a) for name, v, a in zip(
                 names, values.tolist(), along.tolist(), strict=True)}, 60)["solve"] for sign in (1, -1))
             wanted = np.array([float((a - b) / (2 * h)) for a, b in zip(ahead, back, strict=True)])
-        assert close(found, wanted, 1e-7), kernel.name
+        assert close(found, wanted, 1e-7), intrinsic.name
 
 
 @pytest.mark.parametrize("name", ["plain", "dependent rows, singular mass"])
@@ -348,4 +349,4 @@ def test_sizes_and_operations(name: str) -> None:
     saddle, multipliers = Saddle((n, m), ""), Multipliers((n, m), "")
     assert (saddle.n_out, multipliers.n_out) == (n, m)
     tape, _ = taped(saddle, len(given.for_saddle))
-    assert tape.count() == {"kernel": saddle.operations} and tape.operations > n**3 // 3
+    assert tape.count() == {"intrinsic": saddle.operations} and tape.operations > n**3 // 3
