@@ -7,6 +7,7 @@ import os
 import runpy
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 # What most programs come to import; it takes a second and a half.
@@ -27,6 +28,19 @@ def run_program(script: Path) -> subprocess.CompletedProcess[str]:
     assert process.exitcode is not None
     stdout, stderr = (script.with_suffix(ending).read_text(encoding="utf-8") for ending in (".stdout", ".stderr"))
     return subprocess.CompletedProcess(str(script), process.exitcode, stdout, stderr)
+
+
+def passes_apart(check: Callable[[], None]) -> bool:
+    """Whether a function at the top of a file of tests returns, in a process that holds nothing of other tests."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        process = multiprocessing.get_context("spawn").Process(target=check)
+    else:
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(PRELOADED)
+        process = context.Process(target=check)  # type: ignore[assignment]
+    process.start()
+    process.join()
+    return process.exitcode == 0
 
 
 def _execute(script: str, environment: dict[str, str]) -> None:
