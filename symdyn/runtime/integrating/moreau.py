@@ -54,6 +54,8 @@ GROUP_TOLERANCE, GROUP_DEPTH = 3e-7, 1e-7
 GROUP_SWEEPS, GROUP_ROUGH, GROUP_ROUNDS, GROUP_UPDATES = 1000, 30, 10, 400_000
 # Residuals and overlaps above this many tolerances are reported; those of groups.
 REPORTED, GROUP_REPORTED = 1e3, 10
+# Energy that contacts add in a step counts from this part of their work in it on, and is reported from this part of that in all.
+GAINED, GAINED_IN_ALL = 1e-2, 1e-3
 
 
 def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
@@ -185,7 +187,7 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
     stepped = Stepped(np.array(stepper.t), np.array(stepper.h), reached, touched,
                       _losses(module, touched, len(stepper.h))[reached],
                       max(stepper.missed, default=0.0), record.worst_depth, np.array(stepper.missed))
-    doubts = [stepper.doubt()] if status >= 0 else []
+    doubts = [stepper.doubt(), stepper.gained(touched)] if status >= 0 else []
     phases, row_phases = _phases(module, request, stepped)
     return Outcome(np.array(times), np.array(rows), not status, message, interrupted, len(stepper.h), 0, record.n_evaluations,
                    clock.perf_counter() - begun, doubts=tuple(filter(None, doubts)), cause=stepper.cause, stepped=stepped,
@@ -393,6 +395,22 @@ class Stepper:
             return (f"{self.module.name}: bodies overlap by up to {record.worst_depth:.3g} m at the end of a step, which "
                     "no motion of theirs undoes: contacts that exclude each other, or a step that is too long")
         return ""
+
+    def gained(self, touched: Touched) -> str:
+        """Energy that impacts added, if it is more than residuals and errors of the step."""
+        end, impulse, begin = (touched.values[:, k:k + 3] for k in (1, 4, 7))
+        works = np.array([((begin + end) * impulse).sum(axis=1) / 2,
+                          (abs((begin * impulse).sum(axis=1)) + abs((end * impulse).sum(axis=1))) / 2,
+                          self.reported * self.record.tolerance * np.linalg.norm(impulse, axis=1)])
+        added, size, noise = (np.bincount(touched.step, rows, len(self.h)) for rows in works)
+        counts = added > np.maximum(GAINED * size, noise)
+        if not added[counts].sum() > GAINED_IN_ALL * size.sum():
+            return ""
+        first = self.t[int(np.argmax(counts))]
+        return (f"{self.module.name}: impacts add {added[counts].sum():.3g} J in {np.count_nonzero(counts)} of {len(counts)} "
+                f"steps, up to {added.max():.3g} J in a step, the first at t = {first:.6g} s, as Newton's law may with friction "
+                "or several contacts in a step; pass a shorter step or less restitution, or locate impacts, where all contacts "
+                "have a name, with impact='poisson'")
 
     def why(self, status: int) -> str:
         """The reason of a failure."""
