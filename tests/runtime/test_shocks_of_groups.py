@@ -91,6 +91,24 @@ def test_energy_that_a_sphere_between_a_wall_and_another_one_gains_is_reported()
         row(2, 0.0, wall).simulate((0, 0.01), method="moreau", step=1e-3, **start)
 
 
+@pytest.mark.parametrize("speed", [60.0, 100.0])
+def test_spheres_that_pass_through_each_other_in_a_step_are_reported(speed: float) -> None:
+    """One moves by 6 or 10 diameters in a step and leaps over the other; in shorter steps all of its velocity is passed on. A
+    sphere that leaps past another one at a distance is not reported."""
+    module = row(2, 1.0)
+    start = along(np.array([0, 0.45]), np.array([speed, 0]))
+    with pytest.warns(SimulationWarning, match="bodies passed through each other, .* the first are ball_0 and ball_1 in the step "
+                                               "from t = 0 s on; pass a step in which bodies move by less than their radius"):
+        module.simulate((0, 0.03), method="moreau", step=1e-2, **start)
+    start["q"][8] = 2 * R + 1e-3  # y of ball_1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        module.simulate((0, 0.03), method="moreau", step=1e-2, **start)
+        start["q"][8] = 0
+        solution = module.simulate((0, 0.03), method="moreau", step=R / speed, **start)
+    np.testing.assert_allclose(solution.u[-1].reshape(2, 6)[:, 0], [0, speed], atol=1e-9)
+
+
 def test_contacts_without_restitution_take_energy_in_every_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(many_contacts, "RESTITUTION", 0.0)
     system, start = many_contacts.box(N)

@@ -187,7 +187,7 @@ def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
     stepped = Stepped(np.array(stepper.t), np.array(stepper.h), reached, touched,
                       _losses(module, touched, len(stepper.h))[reached],
                       max(stepper.missed, default=0.0), record.worst_depth, np.array(stepper.missed))
-    doubts = [stepper.doubt(), stepper.gained(touched)] if status >= 0 else []
+    doubts = [stepper.doubt(), stepper.gained(touched), stepper.passed()] if status >= 0 else []
     phases, row_phases = _phases(module, request, stepped)
     return Outcome(np.array(times), np.array(rows), not status, message, interrupted, len(stepper.h), 0, record.n_evaluations,
                    clock.perf_counter() - begun, doubts=tuple(filter(None, doubts)), cause=stepper.cause, stepped=stepped,
@@ -411,6 +411,16 @@ class Stepper:
                 f"steps, up to {added.max():.3g} J in a step, the first at t = {first:.6g} s, as Newton's law may with friction "
                 "or several contacts in a step; pass a shorter step or less restitution, or locate impacts, where all contacts "
                 "have a name, with impact='poisson'")
+
+    def passed(self) -> str:
+        """Bodies of groups that a step took through each other, if there are any."""
+        record = self.record
+        if not record.passed:
+            return ""
+        bodies = [body for group in self.module.metadata.contact_groups for body in group.bodies]
+        return (f"{self.module.name}: bodies passed through each other, since they move too far in a step; the first are "
+                f"{bodies[record.passed_a]} and {bodies[record.passed_b]} in the step from t = {record.passed_at:.6g} s on; pass "
+                "a step in which bodies move by less than their radius")
 
     def why(self, status: int) -> str:
         """The reason of a failure."""

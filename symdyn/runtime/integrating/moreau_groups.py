@@ -78,7 +78,7 @@ def add_groups(module: Module, record: Moreau, memory: Memory) -> None:
     memory.take(record, "plane_group", np.append(np.repeat(np.arange(len(groups)), planes), 0).astype(places))
     memory.take(record, "speed_of", np.array([u for group in groups for u in group.speeds], dtype=places))
     memory.put(record, places, cell=3 * n, next=n, table=record.n_table)
-    memory.put(record, float, response=6 * kind * n)
+    memory.put(record, float, response=6 * kind * n, was=3 * n)
 
 
 def room_of(groups: Sequence[GroupRecord]) -> int:

@@ -36,6 +36,10 @@ class Moreau(ctypes.Structure):
     _fields_ = fields_of("runtime/moreau_type.h")
     rough_sweeps: int
     worst_depth: float
+    passed: int
+    passed_a: int
+    passed_b: int
+    passed_at: float
     n_steps: int
     n_rounds: int
     n_evaluations: int

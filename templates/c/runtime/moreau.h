@@ -454,12 +454,46 @@ static int symdyn_watch(
     return failed || !*added ? failed : symdyn_begin(s, t, x);
 }
 
+// Centres at what the frames looked at last.
+static void symdyn_centers(symdyn_moreau *s) {
+    for (long body = 0; body < s->n_bodies; body++)
+        for (int k = 0; k < 3; k++) s->was[3 * body + k] = symdyn_sphere(s, body)[1 + k];
+}
+
+// Note the first pair that a step from t took through each other: the line of centres turned by more than a right angle, and they
+// were nearer than they can be on the straight way. Only where one moves by more than its radius.
+static void symdyn_passing(symdyn_moreau *s, double t) {
+    for (long a = 0; a < s->n_bodies && !s->passed; a++) {
+        const double *one = symdyn_sphere(s, a), *was = s->was + 3 * a;
+        if (!(hypot(hypot(one[1] - was[0], one[2] - was[1]), one[3] - was[2]) > one[0])) continue;
+        for (long b = 0; b < s->n_bodies; b++) {
+            const double *two = symdyn_sphere(s, b), reach = one[0] + two[0] - s->depth;
+            double begin = 0.0, dot = 0.0, way = 0.0, along = 0.0;
+            for (int k = 0; k < 3; k++) {
+                const double before = was[k] - s->was[3 * b + k], after = one[1 + k] - two[1 + k];
+                begin += before * before;
+                dot += before * after;
+                way += (after - before) * (after - before);
+                along += before * (before - after);
+            }
+            if (s->group_of[a] != s->group_of[b] || !(dot < 0.0) || !(begin - along * along / way < reach * reach)) continue;
+            s->passed = 1;
+            s->passed_a = a;
+            s->passed_b = b;
+            s->passed_at = t;
+            return;
+        }
+    }
+}
+
 // One step from (t, x), in place: the motion without contacts, then rounds with those that touch at its begin and those whose gap
 // closes until its middle. They are over only where the latest one makes no further gap close: contacts are only added, so that
 // there is a last one.
 static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, double h, double *x) {
     double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x, off = 0.0, size = 0.0;
-    int failed = symdyn_rate(s, t, x);
+    int failed = s->n_steps || !s->n_bodies ? 0 : symdyn_gaps(s, t, x);
+    symdyn_centers(s);
+    if (!failed) failed = symdyn_rate(s, t, x);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = x[i] + 0.5 * h * s->xd[i];
     failed = symdyn_rate(s, t + 0.5 * h, guess);
@@ -487,6 +521,7 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     if (!failed) failed = symdyn_keep(s, c, t + h, end);
     if (!failed) failed = symdyn_part(s, c, t + h, end);
     if (failed) return failed;
+    symdyn_passing(s, t);
     for (int i = 0; i < s->n_x; i++) x[i] = end[i];
     s->n_steps++;
     return 0;

@@ -36,6 +36,10 @@ typedef struct {
     const long *speed_of;                                // n_bodies*n_speeds: places of their speeds
     long *cell, *next, *table;                           // n_bodies each, n_table
     long n_table;
+    double *was;  // n_bodies*3: centres at the begin of the step
+    int passed;   // whether a pair passed through each other, and which
+    long passed_a, passed_b;
+    double passed_at;
 
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
