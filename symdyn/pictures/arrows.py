@@ -116,7 +116,8 @@ def _contacts(solution: Solution, length: float) -> Iterator[Arrows]:
 
 def _joints(solution: Solution) -> Iterator[Arrows]:
     module, names, n_t = solution.module, solution.module.metadata.reactions, len(solution.t)
-    if names and {REACTIONS, "joint_points"} <= set(module.functions):
+    known = not module.metadata.contact_groups  # whose forces those in joints depend on
+    if names and known and {REACTIONS, "joint_points"} <= set(module.functions):
         at, acting = _rows(solution, "joint_points")[..., 3:], solution.rows(REACTIONS).reshape(n_t, -1, 6)
         for layer, kind, part in (("forces", "force", acting[..., :3]), ("moments", "torque", acting[..., 3:])):
             yield Arrows(layer, [f"{kind} of {name}" for name in names], at, part, 0.0,

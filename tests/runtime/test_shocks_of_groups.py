@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,3 +131,56 @@ def test_misses_of_a_solution_that_was_cut_are_reported(monkeypatch: pytest.Monk
     stepped = solution.stepped
     assert stepped is not None and stepped.residual == stepped.missed.max() > 3e-6
     np.testing.assert_allclose(stepped.missed, many_contacts.missed(solution), rtol=1, atol=1e-6)  # from what was recorded
+
+
+@pytest.fixture(scope="module")
+def poured() -> tuple[sd.Module, dict[str, float]]:
+    """Eight discs that fall into a narrow box, one above the other."""
+    system = sd.System("discs", gravity=[0, -9.81])
+    bodies = [system.add_body(f"disc_{k}", mass=1.0, inertia=0.01) for k in range(8)]
+    joints = [system.add_joint(sd.Planar(f"joint_{k}", system.ground, body)) for k, body in enumerate(bodies)]
+    planes = [sd.contacts.Plane([0, 1]), sd.contacts.Plane([1, 0], point=[-0.33, 0]), sd.contacts.Plane([-1, 0], point=[0.33, 0])]
+    system.add_contact(sd.ContactGroup("discs", bodies, sd.contacts.Sphere(0.1), planes=planes, friction=0.3, restitution=0.2))
+    aside = np.random.default_rng(1).uniform(-0.15, 0.15, 8)
+    start = {str(q): value for k, joint in enumerate(joints)
+             for q, value in zip(joint.coordinates, (aside[k], 0.2 + 0.25 * k, 0.0), strict=True)}
+    return system.compile(), start
+
+
+def test_halving_ends_where_the_order_of_impacts_changes_with_the_step(poured: tuple[sd.Module, dict[str, float]],
+                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    module, start = poured
+    monkeypatch.setattr(moreau, "FIRST", 16)
+    with pytest.warns(SimulationWarning, match="3 halvings of the step did not halve the difference: the order of impacts"):
+        solution = module.simulate((0, 0.7), q=start, method="moreau", rtol=1e-2)
+    assert solution.stepped is not None and solution.stepped.estimate > 1e-2 and solution.n_steps < 2**18
+
+
+def test_what_a_run_of_groups_alone_has(poured: tuple[sd.Module, dict[str, float]], tmp_path: Path) -> None:
+    """No contacts with a name, a file without forces in joints and with the reason, pictures, and a message for another group."""
+    module, start = poured
+    solution = module.simulate((0, 0.1), q=start, method="moreau", step=1 / 256)
+    assert dict(solution.contacts) == {} and list(solution.contact_groups) == ["discs"]
+    with pytest.raises(sd.ArgumentError, match=r"discs: there is no contact group 'disc'; did you mean discs\?"):
+        solution.contact_groups["disc"]
+    with np.load(solution.save(tmp_path / "run.npz")) as stored:
+        assert "reactions, which depend on the forces in the contact groups" in str(stored["about"])
+        assert np.array_equal(stored["x"], solution.x) and not [name for name in stored if name.startswith("reaction")]
+    solution.save(tmp_path / "run.csv")
+    pytest.importorskip("matplotlib")
+    assert solution.plot() is not None and solution.picture([0.1], forces=True) is not None
+    assert solution.view(tmp_path / "run.html").path == tmp_path / "run.html"
+
+
+def test_a_step_longer_than_the_motion_is_warned_of(poured: tuple[sd.Module, dict[str, float]]) -> None:
+    module, start = poured
+    with pytest.warns(SimulationWarning, match=r"step = 5 s is longer than the motion of 0.01 s, which was done in one step"):
+        module.simulate((0, 0.01), q=start, method="moreau", step=5)
+
+
+def test_time_stepping_has_no_sensitivities(poured: tuple[sd.Module, dict[str, float]]) -> None:
+    module, start = poured
+    with pytest.raises(sd.ArgumentError, match="time stepping has none; leave out the method"):
+        module.simulate((0, 0.01), q=start, method="moreau", step=1e-3, sensitivities=["q_joint_0_1(0)"])
+    with pytest.raises(sd.ArgumentError, match=r"no method 'mroeau', did you mean moreau\?"):
+        sd.systems.pendulum().compile().simulate((0, 0.01), method="mroeau")

@@ -40,6 +40,8 @@ KINDS = {CLUTCH: STATUS.SPEED, FRICTION: STATUS.BOUNDED}
 FINEST = 1e-7
 # Steps of the first of the runs whose steps are halved, and at most.
 FIRST, MOST = 64, 2**21
+# Halvings without half the difference, after which no more are tried.
+PATIENCE = 3
 # Steps in one call.
 PIECE = 512
 # Velocities by which the laws are missed, m/s, per m/s of the start; gaps, m.
@@ -95,11 +97,16 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
 
 def run_moreau(module: Module, request: Request, bar: Any = None) -> Outcome:
     """Integrate by time stepping, with steps of a given length, or halved until the coordinates agree within the tolerances."""
-    if request.step:
-        return _run(module, request, request.step, bar)
     begin, end = request.span
+    if request.step:
+        now = _run(module, request, request.step, bar)
+        if request.step > end - begin > 0:
+            doubt = (f"{module.name}: step = {request.step:g} s is longer than the motion of {end - begin:g} s, which was done "
+                     "in one step; pass a step in which no body moves far")
+            return replace(now, doubts=(*now.doubts, doubt))
+        return now
     before: Outcome | None = None
-    n = FIRST
+    n, parts = FIRST, list[float]()
     while True:
         now = _run(module, request, (end - begin) / n, bar)
         if before is not None and now.success and before.success:
@@ -108,6 +115,13 @@ def run_moreau(module: Module, request: Request, bar: Any = None) -> Outcome:
             now = replace(now, stepped=replace(now.stepped, estimate=off), n_steps=now.n_steps + before.n_steps)
             if part <= 1:
                 return now
+            parts.append(part)
+            if len(parts) > PATIENCE and min(parts[-PATIENCE:]) > min(parts[:-PATIENCE]) / 2:
+                doubt = (f"{module.name}: with steps of {(end - begin) / n:.3g} s the coordinates differ by {off:.3g} from those "
+                         f"with twice the step, above rtol = {request.rtol:g}, and {PATIENCE} halvings of the step did not halve "
+                         "the difference: the order of impacts changes with the step, as in piles of many bodies; pass step= and "
+                         "compare what does not depend on single paths")
+                return replace(now, doubts=(*now.doubts, doubt))
             if 2 * n > (request.max_steps or MOST):
                 doubt = (f"{module.name}: with steps of {(end - begin) / n:.3g} s the coordinates differ by {off:.3g} from those "
                          f"with twice the step, above rtol = {request.rtol:g}; pass a larger rtol, more max_steps, or a method "

@@ -35,13 +35,13 @@ def solver_class_of(module: Module, method: Any) -> Any:
 
     if isinstance(method, str):
         if method not in _SCIPY:
-            known = [*COMPILED, "auto", *_SCIPY, "ggl"]
+            known = [*COMPILED, "auto", *_SCIPY, "ggl", "moreau"]
             alike = difflib.get_close_matches(method.lower(), [name.lower() for name in known], 3)
             near = [name for name in known if name.lower() in alike]
             hint = f", did you mean {' or '.join(near)}? There are" if near else "; there are"
             raise ArgumentError(f"{module.name}: there is no method {shown(method)}{hint} {', '.join(COMPILED)} (compiled), "
-                                f"{', '.join(_SCIPY)} (SciPy), auto (chooses one of them), ggl (with constraints), or pass an "
-                                "OdeSolver class")
+                                f"{', '.join(_SCIPY)} (SciPy), auto (chooses one of them), ggl (with constraints), moreau (time "
+                                "stepping of rigid contacts), or pass an OdeSolver class")
         method = getattr(integrate, method)
     if method is integrate.Radau:
         from symdyn.runtime.integrating.scipy_radau import RadauWithin

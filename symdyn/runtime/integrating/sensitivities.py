@@ -95,6 +95,9 @@ class Asked:
 
     def check(self, module: Module, request: Request, method: Any, work: bool) -> None:
         """Raises ArgumentError where a run cannot have sensitivities."""
+        if method == "moreau":
+            raise ArgumentError(f"{module.name}: sensitivities were asked for with method='moreau', and time stepping has none; "
+                                "leave out the method: impacts are located then, and sensitivities carried across them")
         if not isinstance(method, str) or method not in COMPILED or module.backend != "c":
             raise ArgumentError(f"{module.name}: sensitivities were asked for with method {shown(method)} on the backend "
                                 f"{module.backend}; only compiled methods integrate them: compile(backend='c') and "

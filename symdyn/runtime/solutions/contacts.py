@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from symdyn.shown import shown
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
+Of = TypeVar("Of")
 COMPLIANT = "compliant_contacts"
 CLOSED = "closed"
 
@@ -60,17 +61,17 @@ class ContactMotion(NamedTuple):
     switches: tuple[tuple[float, str], ...]
 
 
-class ContactMotions(dict[str, ContactMotion]):
-    """Contacts of a motion by name. Another name raises ArgumentError with those that there are."""
+class ByName(dict[str, Of]):
+    """Contacts of a motion, or groups of them, by name. Another name raises ArgumentError with those that there are."""
 
-    def __init__(self, owner: str, motions: Mapping[str, ContactMotion]) -> None:
+    def __init__(self, owner: str, kind: str, motions: Mapping[str, Of]) -> None:
         super().__init__(motions)
-        self.owner = owner
+        self.owner, self.kind = owner, kind
 
-    def __missing__(self, name: object) -> ContactMotion:
+    def __missing__(self, name: object) -> Of:
         near = difflib.get_close_matches(str(name), self, 3)
         hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(self) or 'none'}"
-        raise ArgumentError(f"{self.owner}: there is no contact {shown(name)}; {hint}")
+        raise ArgumentError(f"{self.owner}: there is no {self.kind} {shown(name)}; {hint}")
 
 
 def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
@@ -80,7 +81,7 @@ def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.
         rigid: Mapping[str, ContactMotion] = stepped_contacts(solution, stepped)
     else:
         rigid = _rigid(solution, phases, row_phases, impacts)
-    return ContactMotions(solution.module.name, {**rigid, **_compliant(solution)})
+    return ByName(solution.module.name, "contact", {**rigid, **_compliant(solution)})
 
 
 def _compliant(solution: Solution) -> dict[str, ContactMotion]:
@@ -130,6 +131,8 @@ def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
 def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactMotion]:
     """Contacts with a name in a motion by time stepping: modes and forces are those of the step before every time."""
     records = solution.module.metadata.contacts
+    if not records:
+        return {}
     n_steps, n = len(stepped.h), len(records)
     values = solution.rows(GAPS).reshape(len(solution.t), -1)
     modes, touched = modes_of(stepped, n), stepped.touched
@@ -174,9 +177,10 @@ class GroupMotion(NamedTuple):
     slip: np.ndarray
 
 
-def group_motions(solution: Solution, stepped: Stepped) -> dict[str, GroupMotion]:
+def group_motions(solution: Solution, stepped: Stepped) -> Mapping[str, GroupMotion]:
     """Every group of contacts by name."""
-    touched, result, first, plane = stepped.touched, {}, 0, 0
+    touched, first, plane = stepped.touched, 0, 0
+    result: dict[str, GroupMotion] = {}
     groups = solution.module.metadata.contact_groups
     n_bodies = sum(len(group.bodies) for group in groups)
     row_of = np.full(len(stepped.h), -1)
@@ -192,7 +196,7 @@ def group_motions(solution: Solution, stepped: Stepped) -> dict[str, GroupMotion
         result[group.name] = GroupMotion(rows[own], touched.a[own] - first, other, modes, values[:, 0], forces[:, 0],
                                          np.linalg.norm(forces[:, 1:], axis=1), np.linalg.norm(values[:, 2:4], axis=1))
         first, plane = end, plane + group.planes
-    return result
+    return ByName(solution.module.name, "contact group", result)
 
 
 def _called(mode: str, record: ContactRecord) -> str:

@@ -746,9 +746,12 @@ class Solution:
             arrays["inputs"] = self.inputs
         if self._n_c:
             about["constraints"] = names(self.module)
-            arrays |= {"lam": self.lam, "constraint_violation": self.constraint_violation,
-                       "velocity_violation": self.velocity_violation}
-        arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
+            arrays |= {"constraint_violation": self.constraint_violation, "velocity_violation": self.velocity_violation}
+        if self.module.metadata.contact_groups:
+            about["left_out"] = "lam and reactions, which depend on the forces in the contact groups"
+        else:
+            arrays |= {"lam": self.lam} if self._n_c else {}
+            arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
         np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
                  about=np.array(json.dumps(about)), **arrays)
 
