@@ -49,8 +49,9 @@ TOLERANCE, DEPTH = 1e-12, 1e-12
 MOST_SWEEPS, MOST_ROUNDS = 20_000, 60
 # Change of the last round of a step, by the size of the state, above which the step is too long.
 ACCEPTED = 1e-6
-# The same in groups of more bodies than FEW, whose problems are solved by sweeps alone.
-FEW = 12
+# The same in groups of more bodies than FEW, whose problems are solved by sweeps; where these do not get there, by Newton steps
+# if no more than so many rows are closed.
+FEW, LATE_DENSE = 12, 240
 GROUP_TOLERANCE, GROUP_DEPTH = 3e-7, 1e-7
 # Sweeps of a round, of one to which contacts were just added; rounds since then; contacts of all sweeps in a step.
 GROUP_SWEEPS, GROUP_ROUGH, GROUP_ROUNDS, GROUP_UPDATES = 1000, 30, 10, 400_000
@@ -288,7 +289,8 @@ class Stepper:
             most += room_of(groups)
             entries += 2 * n_speeds(groups) * room_of(groups)
         many = record.n_bodies > FEW
-        self.cones: Cones = cones(memory, sizes.u, most, entries, 0 if many else min(MOST_DENSE, 3 * most))
+        self.cones: Cones = cones(memory, sizes.u, most, entries, min(LATE_DENSE if many else MOST_DENSE, 3 * most))
+        self.cones.late = int(many)
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))

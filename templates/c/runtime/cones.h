@@ -441,11 +441,11 @@ static double symdyn_cones_solve(symdyn_cones *c, double tolerance, long most_sw
         const long left = end - c->n_sweeps;
         symdyn_cones_sweeps(c, 0.1 * tolerance, sweeps < left ? sweeps : left);
         residual = symdyn_cones_residual(c);
-        if (residual > tolerance && c->most_dense) residual = symdyn_cones_finish(c, residual, tolerance);
+        if (residual > tolerance && c->most_dense && !c->late) residual = symdyn_cones_finish(c, residual, tolerance);
         if (sweeps < 32 || !(residual > 0.1 * before)) continue;
         symdyn_cones_drift(c, 0.1 * tolerance, end);
         residual = symdyn_cones_residual(c);
     }
-    if (residual <= tolerance && c->most_dense) residual = symdyn_cones_polish(c, residual);
+    if (residual <= tolerance && c->most_dense && !c->late) residual = symdyn_cones_polish(c, residual);
     return c->residual = residual;
 }

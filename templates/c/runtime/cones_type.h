@@ -9,6 +9,7 @@ typedef struct {
     long n, most;             // contacts, and how many there is room for
     long most_entries;        // room for columns of J of all contacts
     long most_dense;          // rows up to which a matrix is factorized in memory
+    int late;                 // 1: that is for the caller, after sweeps that did not get there
     long *first;              // rows of contact i: first[i] to first[i + 1], at most three
     long *entry;              // columns of contact i: entry[i] to entry[i + 1]
     int *speed;               // of a column

@@ -256,6 +256,7 @@ static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, int rou
         const long most = left < s->most_sweeps ? left : s->most_sweeps;
         symdyn_cones_solve(c, s->tolerance, rough || most < s->rough_sweeps ? s->rough_sweeps : most);
         s->updates_left -= (c->n_sweeps - begun) * c->n;
+        if (!rough && c->late && c->residual > s->tolerance) c->residual = symdyn_cones_finish(c, c->residual, s->tolerance);
         again = 0;
         for (long i = 0; i < c->n && !rough; i++)
             if (!s->broken[i] && symdyn_slips(s, c, i)) {
