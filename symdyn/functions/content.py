@@ -59,12 +59,12 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     if equations.singular_fallback is not None:
         there = tapes_of(equations.singular_fallback, names, right_side)
         differ = {n: t for n, t in there.items() if n in several or _entries(t) != _entries(tapes[n])}
-        tapes |= {f"{n} otherwise": t for n, t in differ.items()}
+        tapes |= {f"{n} singular": t for n, t in differ.items()}
     folded = {**bound, **(dict.fromkeys(closed_names(equations), 0.0) if right_side.open_contacts else {})}
     if folded:
         tapes = _together(tapes, lambda whole: specialize(whole, folded))
     tapes = _together(tapes, balance)
-    singular_fallback = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
+    singular_fallback = {n: tapes.pop(f"{n} singular") for n in names if f"{n} singular" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
                     *column_names(symbols, right_side.sensitivities)],

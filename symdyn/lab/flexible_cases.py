@@ -315,7 +315,7 @@ def in_all_coordinates(system: System, result: Equations, states: States) -> dic
 
 def accelerations(result: Equations, states: States) -> dict[str, np.ndarray]:
     """By the names of the speeds."""
-    numbers = values(getattr(result, "otherwise", None) or result, states, "accelerations")["accelerations"]
+    numbers = values(result.singular_fallback or result, states, "accelerations")["accelerations"]
     return dict(zip([u.name for u in result.symbols.speeds], numbers.T, strict=True))
 
 

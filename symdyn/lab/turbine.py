@@ -60,7 +60,7 @@ def values(equations: Equations, states: States, *names: str) -> dict[str, np.nd
 def body_accelerations(equations: Equations, states: States) -> np.ndarray:
     """[a_G; alpha] of every body, n-frame, (n, n_b, 6); where statements for them fail, by the numeric algorithm."""
     result = values(equations, states, "J", "Jd_qd")
-    ud = values(getattr(equations, "otherwise", None) or equations, states, "accelerations")["accelerations"]
+    ud = values(equations.singular_fallback or equations, states, "accelerations")["accelerations"]
     return (np.einsum("nij,nj->ni", result["J"], ud) + result["Jd_qd"]).reshape(len(ud), -1, 6)
 
 

@@ -177,7 +177,7 @@ def added(system: sd.System, form: str, monkeypatch: pytest.MonkeyPatch, quantit
     """Operations more than without the check."""
     counts = []
     for way in (vanishing_pivots, lambda tree, solid=False: {}):
-        monkeypatch.setattr(trees, "lockable", way)
+        monkeypatch.setattr(trees, "vanishing_pivots", way)
         counts.append(function_tape(getattr(system, form)(), quantity).operations)
     return counts[0] - counts[1]
 

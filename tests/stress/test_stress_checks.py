@@ -112,7 +112,7 @@ def test_only_states_next_to_lost_rank_or_singular_ones_are_set_aside() -> None:
 
 def test_corrections_are_looked_at_beside_the_constraints(tied: SystemUnderTest) -> None:
     where = rounding.states(tied, 40)
-    off = rounding.beside(tied, where)
+    off = rounding.off_constraints(tied, where)
     sizes = [np.abs(tied.evaluate("C", w.t, w.x)[:, 0]) for w in (where, off)]
     assert sizes[0].max() < 1e-12 and np.median(sizes[1][1::2]) > 1e-5 and (sizes[1][::2] == sizes[0][::2]).all()
     measured = rounding.Measured(tied, "position_correction", off)
