@@ -305,7 +305,7 @@ class Stepper:
         listed = ("a", "b", "was_a", "was_b", "was_at", "sum_a", "sum_b", "old_a", "old_b")
         memory.put(record, places, **dict.fromkeys(listed, most), old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
-        memory.put(record, float, work=8 * n_x, at_end=4 * most, basis=9 * most,
+        memory.put(record, float, given_was=2 * n_given, work=8 * n_x, at_end=4 * most, basis=9 * most,
                    **dict.fromkeys(("P_old", "P_guess", "incoming"), 3 * most))
         record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
@@ -429,10 +429,14 @@ class Stepper:
                 "have a name, with impact='poisson'")
 
     def passed(self) -> str:
-        """Bodies of groups that a step took through each other, if there are any."""
+        """Bodies that a step took through each other, if there are any."""
         record = self.record
         if not record.passed:
             return ""
+        if record.passed_b < 0:
+            contact = self.module.metadata.contacts[record.passed_a].name
+            return (f"{self.module.name}: the bodies of contact {contact} passed through each other, since they move too far in "
+                    f"a step, the first time in the step from t = {record.passed_at:.6g} s on; pass a shorter step")
         bodies = [body for group in self.module.metadata.contact_groups for body in group.bodies]
         return (f"{self.module.name}: bodies passed through each other, since they move too far in a step; the first are "
                 f"{bodies[record.passed_a]} and {bodies[record.passed_b]} in the step from t = {record.passed_at:.6g} s on; pass "

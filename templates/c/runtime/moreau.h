@@ -487,6 +487,42 @@ static void symdyn_passing(symdyn_moreau *s, double t) {
     }
 }
 
+// Gaps of contacts with a name and their rates at the begin of a step from (t, x).
+static int symdyn_given_begin(symdyn_moreau *s, double t, const double *x) {
+    const int failed = s->n_given ? symdyn_gaps(s, t, x) : 0;
+    for (long i = 0; i < s->n_given && !failed; i++) {
+        s->given_was[2 * i] = s->gap[4 * i];
+        s->given_was[2 * i + 1] = s->gap[4 * s->n_given + s->given_first[i]];
+    }
+    return failed;
+}
+
+// Note the first contact with a name that a step from (t, x) to end leapt over: without an impulse its gap goes from closing to
+// opening, and is negative somewhere on the straight way.
+static int symdyn_given_passing(
+    symdyn_moreau *s, const symdyn_cones *c, double t, double h, const double *x, const double *end, double *between) {
+    enum { POINTS = 32 };
+    int failed = s->n_given && !s->passed ? symdyn_gaps(s, t + h, end) : 0;
+    for (long i = 0; i < s->n_given && !failed && !s->passed; i++) {
+        const double rate = s->gap[4 * s->n_given + s->given_first[i]];
+        int suspect = s->given_kind[i] == SYMDYN_PLACED && s->given_was[2 * i] > 0.0 && s->given_was[2 * i + 1] < 0.0
+            && s->gap[4 * i] > 0.0 && rate > 0.0;
+        for (long k = 0; k < c->n; k++) suspect = suspect && !(s->a[k] == i && s->b[k] < 0 && c->P[c->first[k]] > 0.0);
+        for (int p = 1; suspect && p < POINTS && !failed && !s->passed; p++) {
+            for (int k = 0; k < s->n_x; k++) between[k] = x[k] + (end[k] - x[k]) * p / POINTS;
+            failed = symdyn_settle(s, t + h * p / POINTS, between);
+            if (!failed) failed = symdyn_gaps(s, t + h * p / POINTS, between);
+            if (failed || !(s->gap[4 * i] < -1e3 * s->depth)) continue;
+            s->passed = 1;
+            s->passed_a = i;
+            s->passed_b = -1;
+            s->passed_at = t;
+        }
+        if (suspect && !failed) failed = symdyn_gaps(s, t + h, end);
+    }
+    return failed;
+}
+
 // One step from (t, x), in place: the motion without contacts, then rounds with those that touch at its begin and those whose gap
 // closes until its middle. They are over only where the latest one makes no further gap close: contacts are only added, so that
 // there is a last one.
@@ -494,6 +530,7 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x, off = 0.0, size = 0.0;
     int failed = s->n_steps || !s->n_bodies ? 0 : symdyn_gaps(s, t, x);
     symdyn_centers(s);
+    if (!failed) failed = symdyn_given_begin(s, t, x);
     if (!failed) failed = symdyn_rate(s, t, x);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = x[i] + 0.5 * h * s->xd[i];
@@ -523,6 +560,8 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     if (!failed) failed = symdyn_part(s, c, t + h, end);
     if (failed) return failed;
     symdyn_passing(s, t);
+    failed = symdyn_given_passing(s, c, t, h, x, end, guess);
+    if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) x[i] = end[i];
     s->n_steps++;
     return 0;

@@ -36,8 +36,9 @@ typedef struct {
     const long *speed_of;                                // n_bodies*n_speeds: places of their speeds
     long *cell, *next, *table;                           // n_bodies each, n_table
     long n_table;
-    double *was;  // n_bodies*3: centres at the begin of the step
-    int passed;   // whether a pair passed through each other, and which
+    double *was;        // n_bodies*3: centres at the begin of the step
+    double *given_was;  // n_given*2: gaps of contacts with a name, and their rates, at the begin of the step
+    int passed;         // whether a pair passed through each other, and which; or a contact with a name, and -1
     long passed_a, passed_b;
     double passed_at;
 
