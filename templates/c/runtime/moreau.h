@@ -497,8 +497,17 @@ static int symdyn_given_begin(symdyn_moreau *s, double t, const double *x) {
     return failed;
 }
 
+// Relative velocity along the normal of contact i by the speeds, at (t, x).
+static int symdyn_given_row(symdyn_moreau *s, long i, double t, const double *x, const double **row) {
+    const int stopped = symdyn_look(s, t, x);
+    if (stopped) return stopped;
+    *row = s->direction + s->given_first[i] * s->n_u;
+    s->reason = s->directions(s->directions_frame);
+    return s->reason ? SYMDYN_MOREAU_CONTACT : 0;
+}
+
 // Note the first contact with a name that a step from (t, x) to end leapt over: without an impulse its gap goes from closing to
-// opening, and is negative somewhere on the straight way.
+// opening, is negative somewhere on the straight way, and its normal turns by more than a right angle.
 static int symdyn_given_passing(
     symdyn_moreau *s, const symdyn_cones *c, double t, double h, const double *x, const double *end, double *between) {
     enum { POINTS = 32 };
@@ -508,11 +517,19 @@ static int symdyn_given_passing(
         int suspect = s->given_kind[i] == SYMDYN_PLACED && s->given_was[2 * i] > 0.0 && s->given_was[2 * i + 1] < 0.0
             && s->gap[4 * i] > 0.0 && rate > 0.0;
         for (long k = 0; k < c->n; k++) suspect = suspect && !(s->a[k] == i && s->b[k] < 0 && c->P[c->first[k]] > 0.0);
-        for (int p = 1; suspect && p < POINTS && !failed && !s->passed; p++) {
+        for (int p = 1, inside = 0; suspect && p < POINTS && !failed && !inside; p++) {
             for (int k = 0; k < s->n_x; k++) between[k] = x[k] + (end[k] - x[k]) * p / POINTS;
             failed = symdyn_settle(s, t + h * p / POINTS, between);
             if (!failed) failed = symdyn_gaps(s, t + h * p / POINTS, between);
-            if (failed || !(s->gap[4 * i] < -1e3 * s->depth)) continue;
+            inside = !failed && s->gap[4 * i] < -1e3 * s->depth;
+            if (!inside) continue;
+            const double *row = s->direction;
+            double dot = 0.0;
+            failed = symdyn_given_row(s, i, t, x, &row);
+            for (int k = 0; k < s->n_u && !failed; k++) between[k] = row[k];
+            if (!failed) failed = symdyn_given_row(s, i, t + h, end, &row);
+            for (int k = 0; k < s->n_u && !failed; k++) dot += between[k] * row[k];
+            if (failed || !(dot < 0.0)) continue;
             s->passed = 1;
             s->passed_a = i;
             s->passed_b = -1;
