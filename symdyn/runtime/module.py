@@ -935,7 +935,7 @@ class Module:
                    that touch at the start stick, or slide where they have no friction
 
         Contacts that stick stay where they are; all else moves until it balances. Raises NoEquilibrium where nothing does, or
-        where the contacts would have to pull or rub more than they can; ArgumentError for what does not fit. See
+        where the contacts would have to pull, or need more friction than they have; ArgumentError for what does not fit. See
         symdyn.statics.contact_rest.Rest for the forces, which contacts carry, and the range over which the state stays.
 
         >>> y = sd.coordinates("y")

@@ -337,7 +337,7 @@ def _with_forces(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs:
     forces = _Forces(module, at, held_places(module, p))
     slack = forces.slack()
     if slack < -WITHIN:
-        raise NoEquilibrium(f"{module.name}: contacts would have to {forces.fault()}; this position does not stay at rest")
+        raise NoEquilibrium(f"{module.name}: its contacts would {forces.fault()}; this position does not stay at rest")
     result = {}
     for record, rows in zip(module.metadata.contacts, rows_of(module.metadata.contacts), strict=True):
         mode = OPEN if rows[0] not in forces.held else STICKING if set(rows[1:]) & set(forces.held) else SLIDING
@@ -410,8 +410,9 @@ class _Forces:
                 if normal < -WITHIN * self.size:
                     result.append(f"pull ({name} by {-normal:.6g} N)")
                 elif friction > self.static[k] * normal + WITHIN * self.size:
-                    result.append(f"rub more than they can ({name}: {friction:.6g} N of {self.static[k] * normal:.6g} N)")
-        return " and ".join(result) or "pull or rub more than they can"
+                    result.append(f"need more friction than they have ({name}: {friction:.6g} N of "
+                                  f"{self.static[k] * normal:.6g} N)")
+        return " and ".join(result) or "pull, or need more friction than they have"
 
     def _solved(self, cost: np.ndarray, of_slack: float) -> tuple[Any, float]:
         """y of least cost with all planes (and the largest slack where of_slack is -1), and the slack; takes best as far as the
