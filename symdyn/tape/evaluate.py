@@ -30,11 +30,15 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30,
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
     if missing:
         raise KeyError(f"no value for {', '.join(missing)}")
-    done = walk(tape.steps, _AtLeaves(digits, values, constants))
+    return outputs_of(tape, walk(tape.steps, _AtLeaves(digits, values, constants)).of)
+
+
+def outputs_of(tape: Tape, value: Callable[[Any], Any]) -> dict[str, np.ndarray]:
+    """Outputs by name as arrays of objects; value: of an entry."""
     result = {}
     for name, output in tape.outputs.items():
         array = np.empty(len(output.entries), dtype=object)
-        array[:] = [done.of(e) for e in output.entries]
+        array[:] = [value(e) for e in output.entries]
         result[name] = array.reshape(output.shape)
     return result
 

@@ -15,7 +15,7 @@ import numpy as np
 from flint import arb
 from flint import ctx as context
 
-from symdyn.tape.evaluate import Lenient
+from symdyn.tape.evaluate import Lenient, outputs_of
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape
 from symdyn.tape.walk import Arithmetic, walk
@@ -37,13 +37,7 @@ def evaluate_quickly(tape: Tape, values: Mapping[str, float], digits: int) -> di
     """
     before, context.dps = context.dps, digits
     try:
-        done = walk(tape.steps, _Flint(values, digits))
-        result = {}
-        for name, output in tape.outputs.items():
-            array = np.empty(len(output.entries), dtype=object)
-            array[:] = [done.of(e) for e in output.entries]
-            result[name] = array.reshape(output.shape)
-        return result
+        return outputs_of(tape, walk(tape.steps, _Flint(values, digits)).of)
     finally:
         context.dps = before
 
