@@ -11,10 +11,10 @@ import json
 import math
 import os
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -24,8 +24,11 @@ from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     from symdyn.runtime.module import Module
 
+Line = TypeVar("Line", bound="DataclassInstance")
 # Numbers of bars; 3 n + 2 of n + 1 panels.
 SIZES = (20, 50, 101, 200)
 # Panels are 1 m long; the towers stand out so high, the main cables and the deck sag so much, as parts of the span.
@@ -271,18 +274,24 @@ def with_children() -> float:
     return used.user + used.system + used.children_user + used.children_system
 
 
+def measured(sizes: Sequence[int], measure: Callable[[int], Line], heading: str, to_json: Path | None) -> list[Line]:
+    """A record for each size, printed as soon as it is measured, and stored in a file at the end."""
+    print(heading)
+    rows = []
+    for size in sizes:
+        rows.append(measure(size))
+        print(rows[-1], flush=True)
+    if to_json is not None:
+        to_json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+    return rows
+
+
 def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     """Measure and print; returns how many bounds are missed. Raises ArgumentError for numbers of bars that no bridge has."""
     for bars in sizes:
         design(bars)
-    print(HEADING)
-    rows = []
-    for bars in sizes:
-        rows.append(measure(bars))
-        print(rows[-1], flush=True)
+    rows = measured(sizes, measure, HEADING, to_json)
     print(f"error of accelerations relative to equations by hand with {DIGITS} digits (<= {BOUNDS[0]:.1e} of the condition "
           f"number); energy and C over {DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
-    if to_json is not None:
-        to_json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     return sum(result > bound for row in rows
                for result, bound in zip((row.error / row.condition, row.energy, row.violation), BOUNDS, strict=True))

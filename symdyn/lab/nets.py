@@ -3,17 +3,16 @@ accelerations compared with a dense solution of equations by hand with 60 digits
 
 from __future__ import annotations
 
-import json
 import time as clock
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError
-from symdyn.lab.bridges import with_children
+from symdyn.lab.bridges import measured, with_children
 from symdyn.model.closures import Rod
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
@@ -169,14 +168,8 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     if not sizes or min(sizes) < 3:
         result = " ".join(map(str, sizes)) or "none"
         raise ArgumentError(f"nets take numbers of particles along a side, 3 or more; found {result}")
-    print(HEADING)
-    rows = []
-    for side in sizes:
-        rows.append(measure(side))
-        print(rows[-1], flush=True)
+    rows = measured(sizes, measure, HEADING, to_json)
     print(f"error of accelerations relative to equations by hand with {BITS} bits (<= {BOUNDS[0]:g}); energy and C over "
           f"{DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
-    if to_json is not None:
-        to_json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     return sum(result > bound for row in rows
                for result, bound in zip((row.error, row.energy, row.violation), BOUNDS, strict=True))
