@@ -2,7 +2,7 @@
 
     python tests/mutate.py --count 300 --seed 1             # goes on where an earlier run stopped
     python tests/mutate.py --count 300 --seed 1 --summary   # what is known so far, with the survivors
-    python tests/mutate.py --again                          # the survivors once more, after tests were added
+    python tests/mutate.py --jobs 2 --again                 # the survivors once more, after tests were added
 
 Each mutant is one changed operator, comparison, condition, constant or result in model, formulation, tape, backend or runtime. It
 stands in a copy of the working tree, where the tests that enter the changed function run, those first that enter few others,
@@ -25,8 +25,10 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -94,6 +96,13 @@ def tree(folder: Path) -> Path:
     return folder
 
 
+def compiled(folder: Path) -> Path:
+    """The copy with the bytecode of its files, which is passed over where a file has changed."""
+    command = [sys.executable, "-m", "compileall", "-q", "--invalidation-mode", "checked-hash", "symdyn", "tests"]
+    subprocess.run(command, cwd=folder, check=True)
+    return folder
+
+
 def sources() -> list[str]:
     """The files that are changed."""
     return [str(path.relative_to(ROOT)) for package in PACKAGES for path in sorted((ROOT / "symdyn" / package).rglob("*.py"))]
@@ -123,7 +132,7 @@ def run_tests(folder: Path, files: Sequence[str], limit: float, **environment: s
     return ("passed" if done.returncode in (0, 5) else "endless" if ended else "failed"), done.stdout
 
 
-def note_functions(notes: Path) -> None:
+def note_functions(notes: Path, jobs: int) -> None:
     """Write which test enters which functions, a line for each test; files that are noted as they are now are passed over.
 
     The lines hold numbers of functions; `functions.json` beside them holds their names.
@@ -138,16 +147,19 @@ def note_functions(notes: Path) -> None:
         for name in sources():
             (folder / name).write_text(_counting((folder / name).read_text(encoding="utf-8"), name, numbers), encoding="utf-8")
         names.write_text(json.dumps(numbers), encoding="utf-8")
-        for name, text in tests.items():
-            digest = hashlib.sha256(text).hexdigest()
-            if known.get(name) == digest or name.startswith(LEFT_OUT):
-                continue
+        lines, lock = str(notes.absolute() / "tests.jsonl"), threading.Lock()
+
+        def note(name: str, digest: str) -> None:
             begun = time.monotonic()
-            lines = str(notes.absolute() / "tests.jsonl")
             verdict, _ = run_tests(folder, [name, "--maxfail=1000"], FILE_SECONDS, MUTATION_NOTE=lines)
-            known[name] = digest
-            finished.write_text(json.dumps(known, indent=1), encoding="utf-8")
-            print(f"{name}: {verdict}, {time.monotonic() - begun:.1f} s", flush=True)
+            with lock:
+                known[name] = digest
+                finished.write_text(json.dumps(known, indent=1), encoding="utf-8")
+                print(f"{name}: {verdict}, {time.monotonic() - begun:.1f} s", flush=True)
+
+        digests = {name: hashlib.sha256(text).hexdigest() for name, text in tests.items() if not name.startswith(LEFT_OUT)}
+        with ThreadPoolExecutor(jobs) as side_by_side:
+            list(side_by_side.map(lambda one: note(*one), [one for one in digests.items() if known.get(one[0]) != one[1]]))
 
 
 def _counting(text: str, file: str, numbers: dict[str, int]) -> str:
@@ -271,6 +283,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the random order (default 1)")
     parser.add_argument("--seconds", type=float, default=120.0, help="of tests for a mutant, by their noted times")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after these")
+    parser.add_argument("--jobs", type=int, default=1, help="copies of the tree that are tested side by side (default 1)")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mutation", help="of notes and results")
     parser.add_argument("--summary", action="store_true", help="print what is known, run nothing")
     parser.add_argument("--again", action="store_true", help="run survivors once more, after noting the functions of new tests")
@@ -279,21 +292,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen, known = sample(options.seed, options.count), results(file)
     known = {mutant.name: known[mutant.name] for mutant in chosen if mutant.name in known}
     if not options.summary:
-        note_functions(options.folder)
-        tests, begun = Tests.read(options.folder), time.monotonic()
-        with tempfile.TemporaryDirectory(prefix="mutation-") as made:
-            folder = tree(Path(made))
-            for number, mutant in enumerate(chosen):
-                done = known.get(mutant.name)
-                if done and not (options.again and done.verdict in ("survived", "unseen")):
+        note_functions(options.folder, options.jobs)
+        tests, lock, waiting = Tests.read(options.folder), threading.Lock(), iter(list(enumerate(chosen, 1)))
+        end = time.monotonic() + 60 * options.minutes
+
+        def work(folder: Path) -> None:
+            while time.monotonic() < end:
+                with lock:
+                    number, mutant = next(waiting, (0, None))
+                if mutant is None:
+                    return
+                before = known.get(mutant.name)
+                if before and not (options.again and before.verdict in ("survived", "unseen")):
                     continue
-                if time.monotonic() - begun > 60 * options.minutes:
-                    break
-                one = known[mutant.name] = judge(mutant, folder, tests, options.seconds)
-                with file.open("a", encoding="utf-8") as lines:
+                one = judge(mutant, folder, tests, options.seconds)
+                with lock, file.open("a", encoding="utf-8") as lines:
+                    known[mutant.name] = one
                     lines.write(json.dumps(asdict(one)) + "\n")
-                print(f"{number + 1:4} {one.verdict:8} {one.seconds:6.1f} s  {one.file}:{one.line}: {one.before} -> {one.after}",
-                      flush=True)
+                    print(f"{number:4} {one.verdict:8} {one.seconds:6.1f} s  {one.file}:{one.line}: {one.before} -> {one.after}",
+                          flush=True)
+
+        with tempfile.TemporaryDirectory(prefix="mutation-") as made, ThreadPoolExecutor(options.jobs) as side_by_side:
+            list(side_by_side.map(work, [compiled(tree(Path(made) / str(number))) for number in range(options.jobs)]))
     print("\n".join(summary(known)))
     return int(any(one.verdict in ("survived", "unseen") for one in known.values()))
 

@@ -26,8 +26,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     result = yield
     if file:
         line = {"test": item.nodeid, "seconds": round(sum(os.times()[:4]) - begun, 3), "entered": sorted(ENTERED)}
-        with Path(file).open("a", encoding="utf-8") as lines:
-            lines.write(json.dumps(line) + "\n")
+        with Path(file).open("ab", buffering=0) as lines:  # each line in one piece: several processes write
+            lines.write(json.dumps(line).encode() + b"\n")
     return result
 
 
