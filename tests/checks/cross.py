@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from symdyn.runtime.building import shared
 from tests.backend.c_warnings import LANGUAGE, WARNINGS
 from tests.checks.programs import Written, written
 
@@ -107,6 +108,17 @@ def test_shared_libraries(name: str, mechanism: Written, tmp_path: Path) -> None
     assert f"{mechanism.name}_rhs".encode() in library.read_bytes()
     divided = compiled(target, tmp_path / f"divided{target.suffix}", *shared, *UNITS, *mechanism.units)
     assert divided.read_bytes().startswith(target.magic)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("part", ["moreau", "hybrid"])
+def test_what_is_compiled_once(name: str, part: str, tmp_path: Path) -> None:
+    """The libraries of the runtime that serve every mechanism."""
+    target = TARGETS[name]
+    source = tmp_path / f"{part}.c"
+    source.write_text(shared.text(part), encoding="utf-8")
+    options = ["-shared", *([] if "windows" in name else ["-fPIC"]), *UNITS]
+    assert compiled(target, tmp_path / f"{part}{target.suffix}", *options, source).read_bytes().startswith(target.magic)
 
 
 @pytest.mark.parametrize("name", TARGETS)

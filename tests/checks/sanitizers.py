@@ -67,14 +67,18 @@ def test_written_mechanisms(name: str, method: str, compiler: str, tmp_path: Pat
     assert output(tmp_path / "selftest").endswith("all results agree\n")
 
 
-def test_parts_of_the_runtime(compiler: str) -> None:
-    """All of tests/backend/test_runtime_in_c.py in a process that has the sanitizer's library loaded."""
+@pytest.mark.parametrize("tests", ["backend/test_runtime_in_c.py", "backend/test_cones.py", "runtime/test_hybrid_motion.py",
+                                   "runtime/test_time_stepping.py", "runtime/test_shocks_of_groups.py"])
+def test_parts_of_the_runtime(tests: str, compiler: str) -> None:
+    """Files of tests in a process that has the sanitizer's library loaded."""
     library, shared = COMPILERS[compiler]
     path = output(compiler, f"-print-file-name={library}").strip()
     if not Path(path).is_absolute():
         pytest.skip(f"no {library}")
-    environment = {**os.environ, "LD_PRELOAD": path, "ASAN_OPTIONS": "detect_leaks=0",
+    # Libraries in C++ throw exceptions, which the sanitizer looks for in what is loaded with it.
+    loaded = f"{path} {output('gcc', '-print-file-name=libstdc++.so.6').strip()}"
+    environment = {**os.environ, "LD_PRELOAD": loaded, "ASAN_OPTIONS": "detect_leaks=0",
                    "SYMDYN_CC": " ".join([compiler, *SANITIZED, *shared])}
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/backend/test_runtime_in_c.py"],
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"tests/{tests}"],
                           cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]

@@ -11,10 +11,15 @@ from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler
 
 
+# Doubles, on processors.
+SWITCHES = {"SYMDYN_SINGLE": False, "SYMDYN_THREADS": False}
+
+
 @functools.cache
-def _text(name: str) -> str:
+def text(name: str) -> str:
+    """A file of the runtime with all that it includes, as its library is compiled from it."""
     folder = templates_folder() / "c" / "runtime"
-    return Parts(lambda file: (folder / file).read_text(encoding="utf-8"), {}).text(f"{name}.c")
+    return Parts(lambda file: (folder / file).read_text(encoding="utf-8"), SWITCHES).text(f"{name}.c")
 
 
 def shared(name: str, compiler: Compiler) -> ctypes.CDLL:
@@ -22,4 +27,4 @@ def shared(name: str, compiler: Compiler) -> ctypes.CDLL:
 
     Raises CompileError where the compiler rejects the text, CacheError where the cache folder does not take it.
     """
-    return cache.load(_text(name), f"symdyn_{name}", compiler)
+    return cache.load(text(name), f"symdyn_{name}", compiler)

@@ -124,13 +124,13 @@ static int symdyn_options(const symdyn_site *site, int *mode, double *sign) {
 // The only solution of a problem whose kinetic friction holds what static friction holds. Returns 1, 0 where there is none, -1
 // where there are several or where it is not certain.
 static int symdyn_only_solution(symdyn_modes *m) {
-    int modes[SYMDYN_MOST_SITES][4], n[SYMDYN_MOST_SITES], at[SYMDYN_MOST_SITES] = {0}, found = 0;
+    int modes[SYMDYN_MOST_SITES][4], n[SYMDYN_MOST_SITES] = {0}, at[SYMDYN_MOST_SITES] = {0}, found = 0;
     double signs[SYMDYN_MOST_SITES][4];
     for (int s = 0; s < m->n_sites; s++)
         if (!(n[s] = symdyn_options(m->site + s, modes[s], signs[s]))) return 0;
     for (int s = 0; s >= 0;) {
         int mode[SYMDYN_MOST_SITES];
-        double sign[SYMDYN_MOST_SITES], lam[SYMDYN_MOST_ROWS], w[SYMDYN_MOST_ROWS], apart = 0.0;
+        double sign[SYMDYN_MOST_SITES], lam[SYMDYN_MOST_ROWS] = {0}, w[SYMDYN_MOST_ROWS] = {0}, apart = 0.0;
         for (int k = 0; k < m->n_sites; k++) {
             mode[k] = modes[k][at[k]];
             sign[k] = signs[k][at[k]];

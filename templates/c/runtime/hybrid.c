@@ -3,6 +3,11 @@
 #include "prelude.h"
 #include "hybrid.h"
 
+// What the library of this file exports.
+SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h);
+SYMDYN_EXPORT int symdyn_hybrid_modes(int n, const int *rows, const int *excluded, const double *coefficients, const double *D,
+    const double *b, const double *tolerances, int *mode, double *answer);
+
 // Go on with a motion, as far as it needs nothing of what is left to the caller, with records that are empty. Returns one of the
 // codes of hybrid.h.
 SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h) {

@@ -140,8 +140,8 @@ static int symdyn_problem_of(const symdyn_hybrid *h, int n, const int *contact, 
 static int symdyn_impact(symdyn_hybrid *h, int n, const int *contact, const int *hit) {
     const symdyn_numbers at = symdyn_parts(h);
     double *const impulse = h->impact + 3 * h->n_rows * h->n_impacts, *const before = impulse + h->n_rows;
-    double *const after = before + h->n_rows, v[SYMDYN_MOST_ROWS], back[SYMDYN_MOST_ROWS], gained = 0.0, size = 0.0;
-    symdyn_modes m;
+    double *const after = before + h->n_rows, v[SYMDYN_MOST_ROWS] = {0}, back[SYMDYN_MOST_ROWS] = {0}, gained = 0.0, size = 0.0;
+    symdyn_modes m = {0};
     if (h->n_impacts >= h->most_impacts || symdyn_problem_of(h, n, contact, at.slip, 1, &m)) return SYMDYN_LEFT;
     for (int s = 0; s < n; s++) {
         const int first = m.site[s].first;
@@ -208,7 +208,7 @@ static int symdyn_impact(symdyn_hybrid *h, int n, const int *contact, const int 
 // The modes of n contacts that are closed, from the accelerations; the others are open. accelerations: along all rows.
 static int symdyn_choose(symdyn_hybrid *h, int n, const int *contact, double *acceleration) {
     const symdyn_numbers at = symdyn_parts(h);
-    symdyn_modes m;
+    symdyn_modes m = {0};
     for (int i = 0; i < h->n_rows; i++) acceleration[i] = at.free[i];
     if (n) {
         if (symdyn_problem_of(h, n, contact, at.free, 0, &m)) return SYMDYN_LEFT;

@@ -20,7 +20,7 @@ static int symdyn_responses(symdyn_moreau *s) {
     const int n = s->n_speeds;
     for (long body = 0; body < s->n_bodies; body++) {
         const double *B = symdyn_sphere(s, body) + 10, *M = B + 6 * n;
-        double L[36], *T = s->response + 6 * n * body;
+        double L[36] = {0}, *T = s->response + 6 * n * body;
         for (int j = 0; j < n; j++)
             for (int i = j; i < n; i++) {
                 double sum = M[i * n + j];
@@ -63,7 +63,10 @@ static double symdyn_pair(const symdyn_moreau *s, long a, long b, double *normal
     return distance - one[0] - two[0];
 }
 
-static long symdyn_cell_of(double x, double size) { return (long)floor(x / size); }
+static long symdyn_cell_of(double x, double size) {
+    const double cell = floor(x / size);
+    return (long)cell;
+}
 
 static long symdyn_cell_key(const symdyn_moreau *s, long i, long j, long k) {
     const unsigned long key = (unsigned long)i * 73856093UL ^ (unsigned long)j * 19349663UL ^ (unsigned long)k * 83492791UL;

@@ -466,7 +466,9 @@ static void symdyn_centers(symdyn_moreau *s) {
 static void symdyn_passing(symdyn_moreau *s, double t) {
     for (long a = 0; a < s->n_bodies && !s->passed; a++) {
         const double *one = symdyn_sphere(s, a), *was = s->was + 3 * a;
-        if (!(hypot(hypot(one[1] - was[0], one[2] - was[1]), one[3] - was[2]) > one[0])) continue;
+        double moved = 0.0;
+        for (int k = 0; k < 3; k++) moved += (one[1 + k] - was[k]) * (one[1 + k] - was[k]);
+        if (!(sqrt(moved) > one[0])) continue;
         for (long b = 0; b < s->n_bodies; b++) {
             const double *two = symdyn_sphere(s, b), reach = one[0] + two[0] - s->depth;
             double begin = 0.0, dot = 0.0, way = 0.0, along = 0.0;
@@ -510,17 +512,17 @@ static int symdyn_given_row(symdyn_moreau *s, long i, double t, const double *x,
 // opening, is negative somewhere on the straight way, and its normal turns by more than a right angle.
 static int symdyn_given_passing(
     symdyn_moreau *s, const symdyn_cones *c, double t, double h, const double *x, const double *end, double *between) {
-    enum { POINTS = 32 };
+    const int points = 32;
     int failed = s->n_given && !s->passed ? symdyn_gaps(s, t + h, end) : 0;
     for (long i = 0; i < s->n_given && !failed && !s->passed; i++) {
         const double rate = s->gap[4 * s->n_given + s->given_first[i]];
         int suspect = s->given_kind[i] == SYMDYN_PLACED && s->given_was[2 * i] > 0.0 && s->given_was[2 * i + 1] < 0.0
             && s->gap[4 * i] > 0.0 && rate > 0.0;
         for (long k = 0; k < c->n; k++) suspect = suspect && !(s->a[k] == i && s->b[k] < 0 && c->P[c->first[k]] > 0.0);
-        for (int p = 1, inside = 0; suspect && p < POINTS && !failed && !inside; p++) {
-            for (int k = 0; k < s->n_x; k++) between[k] = x[k] + (end[k] - x[k]) * p / POINTS;
-            failed = symdyn_settle(s, t + h * p / POINTS, between);
-            if (!failed) failed = symdyn_gaps(s, t + h * p / POINTS, between);
+        for (int p = 1, inside = 0; suspect && p < points && !failed && !inside; p++) {
+            for (int k = 0; k < s->n_x; k++) between[k] = x[k] + (end[k] - x[k]) * p / points;
+            failed = symdyn_settle(s, t + h * p / points, between);
+            if (!failed) failed = symdyn_gaps(s, t + h * p / points, between);
             inside = !failed && s->gap[4 * i] < -1e3 * s->depth;
             if (!inside) continue;
             const double *row = s->direction;
