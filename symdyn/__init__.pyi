@@ -2,12 +2,11 @@
 
 from sympy import Symbol
 
-from symdyn import bench as bench
 from symdyn import frames as frames
 from symdyn import lecture as lecture
 from symdyn import rotation as rotation
-from symdyn import stress as stress
 from symdyn import systems as systems
+from symdyn.bench.work import bench as bench
 from symdyn.comparison import Case as Case
 from symdyn.comparison import Erratum as Erratum
 from symdyn.comparison import Formula as Formula
@@ -244,6 +243,7 @@ from symdyn.runtime.inputs.sampled import Sampled as Sampled
 from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.runtime.losses import Loss as Loss
 from symdyn.sdf.read import read_sdf as read_sdf
+from symdyn.stress.run import stress as stress
 from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.sympy_mechanics.system import from_system as from_system
 from symdyn.urdf.read import read_urdf as read_urdf

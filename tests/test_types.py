@@ -15,6 +15,7 @@ from types import ModuleType
 import pytest
 
 import symdyn as sd
+from symdyn import systems
 from symdyn.ensembles import Ensemble
 from symdyn.facade import EquationsFacade, MotionFacade, SystemFacade
 from symdyn.formulation.equations import Equations
@@ -67,7 +68,10 @@ REVEALED = {
     "module.rhs(0.0, [0.0, 0.0, 0.0, 0.0])": "ndarray", "module.equilibrium()": "Equilibrium", "linear": "Linearization",
     'linear.lqr({"x": 1}, {"F": 1})': "Regulator", "module.stability()": "Stability", "equations.verify()": "Verification",
     "equations.base_parameters()": "BaseParameters", "sd.Table([0, 1], [0, 1])": "Table",
-    'module.simulate_batch({"x": [0.1, 0.2]})': "BatchSolution", "module.actuation(0, [0, 0], [0, 0], [0, 0])": "Actuation"}
+    'module.simulate_batch({"x": [0.1, 0.2]})': "BatchSolution", "module.actuation(0, [0, 0], [0, 0], [0, 0])": "Actuation",
+    "x": "Coordinate", 'sd.coordinates("z").dot': "Rate", 'sd.motions("z").dot': "GivenRate", "sd.systems.pendulum()": "System",
+    "sd.systems.four_bar().compile().simulate((0, 1))": "Solution", "sd.systems.names()": "list", "sd.bench(system)": "Benchmark",
+    "sd.stress(system)": "StressReport"}
 
 
 def test_the_stub_has_the_public_names_and_where_they_are() -> None:
@@ -91,6 +95,12 @@ def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path) -> None:
     assert dict(zip(REVEALED, revealed, strict=True)) == REVEALED
 
 
+def test_the_stub_of_the_catalogue_has_its_mechanisms() -> None:
+    text = Path(sd.systems.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    listed = dict(re.findall(r"^from symdyn\.systems\.(\w+ import \w+) as (\w+)$", text, re.MULTILINE))
+    assert {name: home.replace(" import ", ":") for home, name in listed.items()} == systems._CATALOGUE
+
+
 @pytest.fixture
 def jedi(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Jedi with a cache of its own: processes that share one read files that another has half written."""
@@ -100,7 +110,8 @@ def jedi(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 @pytest.mark.parametrize(("after", "names"), [
-    ("sd.", {"System", "Revolute", "coordinates", "motions", "Table", "compare"}),
+    ("sd.systems.", {"pendulum", "four_bar", "names"}), ("sd.systems.pendulum().", {"embedding", "compile"}),
+    ("sd.coordinates('y').", {"dot", "ddot"}), ("sd.", {"System", "Revolute", "coordinates", "motions", "Table", "compare"}),
     ("system.", {"add_body", "add_joint", "add_force", "embedding", "augmented", "defaults"}),
     ("equations.", {"M_tilde", "compile", "verify", "write", "latex"}),
     ("module.", {"simulate", "rhs", "linearize", "equilibrium", "stability"}),
@@ -122,11 +133,10 @@ def test_an_editor_shows_signatures_with_defaults(jedi: ModuleType) -> None:
 RETURNED = (Module, Solution, BatchSolution, Equations, MotionEquations, AugmentedEquations, Equilibrium, Equilibria,
             Linearization, Modes, Mode, Stability, Campbell, Regulator, Actuation, Ensemble, SystemFacade, EquationsFacade,
             MotionFacade)
-# Where no type says it: one symbol or a tuple of them, by the text; entries of SymPy or of nested lists; a matrix, or one with
+# Where no type says it: entries of SymPy or of nested lists; a matrix, or one with
 # intermediates; a comparison or several of them, by the text; what a scalar of a derivation may be; a client of dask, mpi4py
 # or concurrent.futures.
-UNTYPED = {"coordinates", "inputs", "motions", "parameters", "speeds", "Case", "Formula", "compare", "explicit", "rate", "motion",
-           "rates", "ensemble"}
+UNTYPED = {"Case", "Formula", "compare", "explicit", "rate", "motion", "rates", "ensemble"}
 
 
 def _signatures() -> Iterator[tuple[str, inspect.Signature]]:

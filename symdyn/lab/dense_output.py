@@ -96,8 +96,8 @@ def _slider(name: str) -> tuple[sd.System, Any, Any]:
 def _states(name: str, rates: Callable[..., Sequence[Any]], names: str) -> sd.System:
     """A resting body, with extra states of these rates, functions of the states."""
     system, _, _ = _slider(name)
-    z = sd.coordinates(names)
-    z = z if isinstance(z, tuple) else (z,)
+    made: Any = sd.coordinates(names)
+    z = made if isinstance(made, tuple) else (made,)
     for state, rate in zip(z, rates(*z), strict=True):
         system.add_state(state, rate)
     return system

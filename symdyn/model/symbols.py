@@ -6,10 +6,10 @@ All are SymPy symbols, so that expressions print and differentiate as anywhere e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from inspect import getattr_static
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 import numpy as np
 import sympy as sp
@@ -174,6 +174,37 @@ def with_rates(inputs: Iterable[Input]) -> tuple[Input, ...]:
     return tuple(result)
 
 
+if TYPE_CHECKING:
+    One = TypeVar("One", bound=sp.Symbol, covariant=True)
+
+    class _Several(Generic[One]):
+        """The text of names decides whether there is one symbol or a tuple of them; no type can read it, so that both uses are
+        allowed: `x = sd.coordinates("x")` and `x, y = sd.coordinates("x y")`."""
+
+        def __iter__(self) -> Iterator[One]: ...
+        def __len__(self) -> int: ...
+        @overload
+        def __getitem__(self, index: int) -> One: ...
+        @overload
+        def __getitem__(self, index: slice) -> tuple[One, ...]: ...
+        def __getitem__(self, index: int | slice) -> One | tuple[One, ...]: ...
+
+    class Coordinates(Coordinate, _Several[Coordinate]):
+        """A coordinate or several."""
+
+    class Speeds(Speed, _Several[Speed]):
+        """A speed or several."""
+
+    class Parameters(sp.Symbol, _Several[sp.Symbol]):
+        """A parameter or several."""
+
+    class Inputs(Input, _Several[Input]):
+        """A input or several."""
+
+    class GivenMotions(GivenMotion, _Several[GivenMotion]):
+        """A given motion or several."""
+
+
 def _make(kind: type, names: str, assumptions: dict) -> Any:
     if not isinstance(names, str) or not names.strip() or not names.isprintable():
         raise ModelError([f"names of symbols are {shown(names)}; pass text such as 'q1 q2' or 'm1:4'"])
@@ -184,7 +215,7 @@ def _make(kind: type, names: str, assumptions: dict) -> Any:
     return made
 
 
-def coordinates(names: str, **assumptions: bool) -> Any:
+def coordinates(names: str, **assumptions: bool) -> Coordinates:
     """Generalized coordinates from names as for sympy.symbols: `q1, q2 = coordinates("q1 q2")`.
 
     >>> x, theta = sd.coordinates("x theta")
@@ -194,7 +225,7 @@ def coordinates(names: str, **assumptions: bool) -> Any:
     return _make(Coordinate, names, assumptions)
 
 
-def speeds(names: str, **assumptions: bool) -> Any:
+def speeds(names: str, **assumptions: bool) -> Speeds:
     """Generalized speeds with names of their own, to be passed to joints as `speed=` or `speeds=`.
 
     >>> sd.speeds("w1:3")
@@ -203,7 +234,7 @@ def speeds(names: str, **assumptions: bool) -> Any:
     return _make(Speed, names, assumptions)
 
 
-def parameters(names: str, **assumptions: bool) -> Any:
+def parameters(names: str, **assumptions: bool) -> Parameters:
     """Parameters: plain SymPy symbols that get numbers when the motion is computed; declared by use.
 
     >>> m, l = sd.parameters("m l")
@@ -213,7 +244,7 @@ def parameters(names: str, **assumptions: bool) -> Any:
     return _make(sp.Symbol, names, assumptions)
 
 
-def inputs(names: str, **assumptions: bool) -> Any:
+def inputs(names: str, **assumptions: bool) -> Inputs:
     """Free inputs: forces, torques or anything else that is given at run time.
 
     >>> F = sd.inputs("F")
@@ -223,7 +254,7 @@ def inputs(names: str, **assumptions: bool) -> Any:
     return _make(Input, names, assumptions)
 
 
-def motions(names: str, **assumptions: bool) -> Any:
+def motions(names: str, **assumptions: bool) -> GivenMotions:
     """Coordinates that follow inputs: value, rate and acceleration are given at run time, and no equation is solved for them.
 
     names   as for sympy.symbols: `z = sd.motions("z")`

@@ -10,7 +10,6 @@ from symdyn.folders import templates_folder
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler
 
-
 # Doubles, on processors.
 SWITCHES = {"SYMDYN_SINGLE": False, "SYMDYN_THREADS": False}
 
