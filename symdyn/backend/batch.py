@@ -49,11 +49,16 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     dialect = replace(dialect, operations={
         op: f"{f.name}({', '.join(f'VECTOR({{{k}}})' for k in range(len(f.arguments)))})" for op, f in available.items()})
     built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program).functions
-    functions = {f.name: f.regular or f for f in built if f.name in names}
+    functions = {f.name: _whole(f.regular or f) for f in built if f.name in names}
     text = "\n".join(line for function in functions.values() for part in (function.parts or (function,)) for lines in
                      (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
     used = set(re.findall(rf"\b{_PREFIX}\w+", text))
     return Batch(functions, tuple(f for f in available.values() if f.name in used))
+
+
+def _whole(function: Function) -> Function:
+    """A function with the parts of those that it calls as its own."""
+    return replace(function, parts=(*[part for called in function.calls for part in called.parts], *function.parts), calls=())
 
 
 def _lane_functions(scalar: Dialect) -> dict[str, LaneFunction]:

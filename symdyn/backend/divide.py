@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from symdyn.tape.node import Node
@@ -12,19 +12,24 @@ _SUMS = ("add", "sub")
 Stretch = tuple[list[Node], list[Node]]
 
 
-def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[list[Stretch], dict[Node, int], int]:
+def divide(body: Sequence[Node], entries: Sequence[Any], longest: int, before: Mapping[Node, int] | None = None, count: int = 0,
+           later: Collection[Node] = ()) -> tuple[list[Stretch], dict[Node, int], int]:
     """Stretches of `body`, each with the nodes that later ones or the entries need; the place of each such node; their number.
 
     A stretch ends with a section where it can, and has at most `longest` steps. A place is used again once the last stretch
     that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
     others, `longest` by each.
+
+    before   places of nodes that are there when the first stretch begins, among `count`
+    later    nodes that are read after the last stretch, so that their places are not used again
     """
+    before = before or {}
     stretches = stretches_of(products_next_to_their_sums(body, entries), longest)
     begin = len(stretches) - 1
     if len(entries) > longest:
         begin += 1
         stretches += [[] for _ in range(0, len(entries), longest)]
-    where = {node: k for k, stretch in enumerate(stretches) for node in stretch}
+    where = {**dict.fromkeys(before, -1), **{node: k for k, stretch in enumerate(stretches) for node in stretch}}
     last_use: dict[Node, int] = {}
     for k, stretch in enumerate(stretches):
         for node in stretch:
@@ -36,12 +41,12 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
         core, reader = unsigned(e), begin + index // longest
         if where.get(core, reader) != reader:
             last_use[core] = reader
+    last_use |= dict.fromkeys(later, len(stretches))
     over: dict[int, list[Node]] = {}
     for node, k in last_use.items():
         over.setdefault(k, []).append(node)
-    slots: dict[Node, int] = {}
-    free: list[int] = []
-    count = 0
+    slots = {node: slot for node, slot in before.items() if node in last_use}
+    free = sorted(set(range(count)).difference(slots.values()), reverse=True)
     result: list[Stretch] = []
     for k, stretch in enumerate(stretches):
         kept = [node for node in stretch if node in last_use]

@@ -43,6 +43,7 @@ class Function:
     arguments   groups it reads, of t q u z ud inputs p c, in this order
     shape       of its result; loads, sections, results: statements in the dialect
     parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
+    calls       functions that it calls before its own parts, which leave in w what it has in common with others
     regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
                 statements of its own
     written     statements that stand in the code where loops repeat some; steps: those that run
@@ -63,6 +64,7 @@ class Function:
     longest_chain: int
     parts: tuple[Part, ...] = ()
     n_w: int = 0
+    calls: tuple[Function, ...] = ()
     regular: Function | None = None
     singular_fallback: Function | None = None
     inlined: frozenset[Node] = frozenset()

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from symdyn.backend.columns import Columns, MotionColumns, seeds_of
 from symdyn.backend.dialect import Dialect
-from symdyn.backend.divide import divide
-from symdyn.backend.function import ARGUMENTS, Along, Function, Motion, Part
+from symdyn.backend.draft import Draft, Drafts
+from symdyn.backend.function import ARGUMENTS, Along, Function, Motion
 from symdyn.backend.rolled import Rolled
 from symdyn.backend.user_functions import called
 from symdyn.backend.writer import PROLOGUE, STOPPING, Writer, checks_of, cores_of
@@ -46,6 +45,7 @@ class Program:
     one_size  those of them that are called with one size only
     user_functions   functions of the user that are called, by name
     n_c       number of constants that the prologue computes
+    common    functions that several of the functions call first
     """
 
     functions: tuple[Function, ...]
@@ -55,6 +55,7 @@ class Program:
     intrinsics: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     user_functions: tuple[UserFunction, ...] = ()
     one_size: frozenset[str] = frozenset()
+    common: tuple[Function, ...] = ()
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
@@ -81,22 +82,38 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                       + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    inlined = {w.name: w.inlined for f in like.functions for w in (f, f.regular, f.singular_fallback) if w} if like else {}
-    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late, inlined=inlined)
+    inlined = {w.name: w.inlined for f in (*like.functions, *like.common)
+               for w in (f, f.regular, f.singular_fallback) if w} if like else {}
+    drafts = Drafts(dialect, places, hoisted, codes, late, inlined)
+    vectored = [name for name in tapes if name in columns] if vectors is not None else []
+    ways = {f"{name}_{REGULAR}" if name in singular_fallback else name: (name, tape) for name, tape in tapes.items()
+            if name not in vectored}
+    ways |= {f"{name}_{SINGULAR_FALLBACK}": (name, tape) for name, tape in singular_fallback.items()}
     rolls = _rolls(dialect, rolled, late, like)
-
-    def written(name: str, tape: Tape, called: str) -> Function:
-        if name in columns and vectors is not None:
-            return _columns(columns[name], called, titles[name], write, partial(
-                _function, vectors, codes=codes, late=set(), inlined={}), places, hoisted)
-        return write(tape, name=called, title=titles[name], rolls=rolls)
-
+    written = _written(drafts, [drafts.draft(tape, called, titles[name]) for called, (name, tape) in ways.items()], rolls)
+    for name in vectored:
+        called = f"{name}_{REGULAR}" if name in singular_fallback else name
+        written[called] = _columns(columns[name], called, titles[name], drafts, replace(
+            drafts, dialect=vectors or dialect, late=set(), inlined={}))
     functions = tuple(
-        _either(name, titles[name], written(name, tape, f"{name}_{REGULAR}"),
-                write(singular_fallback[name], name=f"{name}_{SINGULAR_FALLBACK}", title=titles[name], rolls=rolls))
-        if name in singular_fallback else written(name, tape, name) for name, tape in tapes.items())
+        _either(name, titles[name], written[f"{name}_{REGULAR}"], written[f"{name}_{SINGULAR_FALLBACK}"])
+        if name in singular_fallback else written[name] for name in tapes)
+    common = {f.name: f for function in written.values() for f in function.calls}
     prologue = _prologue(Writer(dialect, whole, places, {}, codes, late), constants, rolls, functions)
-    return Program(functions, prologue, len(constants), tuple(codes), *_intrinsics(whole))
+    return Program(functions, prologue, len(constants), tuple(codes), *_intrinsics(whole), tuple(common.values()))
+
+
+def _written(drafts: Drafts, wanted: Sequence[Draft], rolls: Rolls) -> dict[str, Function]:
+    """Functions by name, with loops where these save enough; what others have in common stands once."""
+    made: dict[str, Function] = {}
+    for draft in wanted:
+        least = rolls(draft.name, len(draft.body))
+        looped = None if least is None else drafts.looped(draft, least)
+        if looped is not None:
+            made[draft.name] = looped
+    straight = [draft for draft in wanted if draft.name not in made]
+    beginnings = drafts.beginnings(straight)
+    return made | {draft.name: drafts.straight(draft, beginnings.get(draft.name)) for draft in straight}
 
 
 def _rolls(dialect: Dialect, rolled: Rolling, late: set[Node], like: Program | None) -> Rolls:
@@ -161,23 +178,22 @@ def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunct
     return largest, called(tape), frozenset(name for name, result in sizes.items() if len(result) == 1)
 
 
-def _columns(columns: Columns, name: str, title: str, write: Callable[..., Function], write_vectors: Callable[..., Function],
-             places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]]) -> Function:
-    """A Jacobian as a function of what all columns share, and functions of directions."""
-    tape = columns.tape
+def _columns(columns: Columns, name: str, title: str, drafts: Drafts, vectors: Drafts) -> Function:
+    """A Jacobian as a function of what all columns share, and functions of directions, on vectors."""
+    tape, places, hoisted = columns.tape, drafts.places, drafts.hoisted
     moving = [node for node in tape.steps if node.mask & SEED]
     shared = dict.fromkeys(core for node in moving for core in cores_of(node.args)
                            if not core.mask & SEED and core.mask and core.op != "leaf" and core not in hoisted)
     kept = (*shared, *columns.values)
-    values = write(Tape(tape.recorder, {"v": Output("v", (len(kept),), kept)}), name=f"{name}_values", title=title,
-                   dividing=moving)
+    values = drafts.function(Tape(tape.recorder, {"v": Output("v", (len(kept),), kept)}), f"{name}_values", title,
+                             dividing=moving)
     stored = {**hoisted, **{node: ("v", k) for k, node in enumerate(shared)}}
     along = []
     for k, group in enumerate(columns.groups):
         entries = columns.entries(k)
         part = Tape(tape.recorder, {"along": Output("along", (len(entries),), entries)})
-        function = write_vectors(part, hoisted=stored, name=f"{name}_along_{group.name}", title=title,
-                                 places={**places, **seeds_of(group)}, body=[n for n in reachable(entries) if n.mask & SEED])
+        function = replace(vectors, hoisted=stored, places={**places, **seeds_of(group)}).function(
+            part, f"{name}_along_{group.name}", title, [n for n in reachable(entries) if n.mask & SEED])
         along.append(Along(group.first, len(group.seeds), function, not function.parts and function.count <= INLINE))
     groups = {g for f in (values, *[a.function for a in along]) for g in f.arguments}
     operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
@@ -189,54 +205,3 @@ def _columns(columns: Columns, name: str, title: str, write: Callable[..., Funct
         groups |= {"z", *["p"] * bool(columns.held)}
     return Function(name, title, columns.result_shape, tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
                     (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along), motion=motion)
-
-
-def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
-              codes: Mapping[str, int], late: set[Node], name: str, title: str,
-              inlined: Mapping[str, frozenset[Node]], body: Sequence[Node] | None = None,
-              dividing: Sequence[Node] = (), rolls: Rolls = no_loops) -> Function:
-    """One function, in parts if it is long and the dialect divides long ones, with loops for what it repeats.
-
-    body       its steps; None: all that run
-    rolls      see `_rolls`
-    dividing   steps of other functions whose divisors are checked here
-    """
-    wanted = inlined.get(name)
-    output = next(iter(tape.outputs.values()))
-    if body is None and not late:
-        body = tape.running
-    else:
-        running = {*tape.running, *late}
-        taken = tape.steps if body is None else body
-        body = [n for n in taken if n in running and n not in hoisted and n.op != "leaf"]
-    operations = count_of(body)
-    checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in late), *dividing])
-    repeats = rolls(name, len(body))
-    if repeats is not None:
-        made = Rolled(dialect, tape, places, hoisted, codes, checks, body, output.entries, wanted)
-        if made.saved >= repeats:
-            return made.function(name, title, output.shape, tape.longest_chain())
-    if dialect.parts is None or len(body) <= dialect.parts.whole:
-        writer = Writer(dialect, tape, places, hoisted, codes, late, wanted)
-        part = writer.part(body, output.entries, writer.results_of(output.entries), checks)
-        return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, operations,
-                        tape.longest_chain(), inlined=frozenset(writer.printer.inline))
-    parts: list[Part] = []
-    earlier: dict[Node, tuple[str, int]] = {}
-    result: set[Node] = set()
-    longest = dialect.parts.longest
-    stretches, slots, n_w = divide(body, output.entries, longest)
-    storing = max(1, -(-len(output.entries) // longest))
-    for k, (stretch, kept) in enumerate(stretches, storing - len(stretches)):
-        writer = Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
-        if k < 0:
-            parts.append(replace(writer.part(stretch, kept, partial(writer.keep, kept, slots), checks), stores=False))
-        else:
-            ends = range(len(output.entries)) if storing == 1 else range(k * longest, min((k + 1) * longest, len(output.entries)))
-            here = [output.entries[i] for i in ends]
-            parts.append(writer.part(stretch, here, writer.results_of(output.entries, ends), checks))
-        earlier |= {node: ("w", slots[node]) for node in kept}
-        result |= writer.printer.inline
-    groups = {g for part in parts for g in part.arguments}
-    return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), operations,
-                    tape.longest_chain(), tuple(parts), n_w, inlined=frozenset(result))

@@ -329,7 +329,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         outputs=tuple((n, tuple(shape)) for n, shape in content.outputs), reasons=tuple(program.reasons), n_c=program.n_c,
         operations={f.name: f.count for f in program.functions},
         arguments={f.name: tuple(f.arguments) for f in program.functions})
-    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, program.prologue)])
+    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, *program.common, program.prologue)])
     user_texts = texts_of_user_functions(program.user_functions, dialect.name, name)
     identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
     return {
