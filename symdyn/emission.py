@@ -62,7 +62,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     if templates is not None:
         rolled = rolled is True
         as_path(templates, "of the templates", "my_templates")
-    names = groups.written(equations, functions, method if integrator and backend == "c" else None)
+    names = groups.written(equations, functions, method if integrator and backend == "c" else None, baumgarte)
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
         # Devices have no SIMD lanes within a thread.

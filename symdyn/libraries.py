@@ -34,13 +34,15 @@ class Libraries:
 
     again       derives the equations; None: only those that were made can be had elsewhere
     rolled      whether statements that are repeated become loops, as for `emit`
-    equations   None where they were not needed so far; texts: what was generated already
+    equations   None where they were not needed so far; texts: what was generated already; places: as below, where they are known
     """
 
     def __init__(self, again: Callable[[], Equations] | None, backend: str, templates: str | os.PathLike | None,
                  specialize: Mapping[Any, float] | None, fallback: str, equations: Equations | None = None,
-                 texts: Texts | None = None, rolled: Rolling = "auto") -> None:
+                 texts: Texts | None = None, rolled: Rolling = "auto", places: Places | None = None) -> None:
         self.rolled = rolled
+        if places is not None:
+            self.places = places
         self.again, self.backend, self.templates, self.specialize, self.fallback = again, backend, templates, specialize, fallback
         self._equations = equations
         self.texts = texts or Texts(backend)
@@ -56,7 +58,7 @@ class Libraries:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback, None, self.texts,
-                           self.rolled)
+                           self.rolled, self.__dict__.get("places"))
 
     @cached_property
     def rhs(self) -> Source:
@@ -89,7 +91,7 @@ class Libraries:
     @cached_property
     def places(self) -> Places | None:
         """Where the derivative of x_dot by x may differ from zero; None where that is unknown."""
-        return places(self.equations)
+        return None if self._equations is None and self.again is None else places(self.equations)
 
     @cached_property
     def breaks(self) -> Tape | None:

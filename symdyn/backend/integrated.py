@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from symdyn.backend.band import Band
 from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import Method
 
@@ -89,13 +90,14 @@ class Shape:
         return sorted({index for index in self.resets if index < middle}) if self.n_rows and self.directed else []
 
 
-def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,
+def functions(needs: Sequence[str], arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,
               projects: bool) -> list[Integrated]:
     """The functions that an integrator calls, of those that there are.
 
-    call   (name, result) -> arguments of a call at t and x
+    needs   those that its method needs besides rhs
+    call    (name, result) -> arguments of a call at t and x
     """
-    names = ("rhs", *method.needs, *OF_EVENTS, *OF_COLUMNS, *(OF_PROJECTION if projects else ()))
+    names = ("rhs", *needs, *OF_EVENTS, *OF_COLUMNS, *(OF_PROJECTION if projects else ()))
     at = [Integrated("field" if name == "rhs" else f"{name}_at", name, call(name, "out"),
                      n_in > 0 and (name == "rhs" or "inputs" in arguments_of[name]))
           for name in names if name in arguments_of]
@@ -122,8 +124,11 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
         result.append(("SYMDYN_CARRIED", shape.carried))
     if shape.columns and shape.held:
         result.append(("SYMDYN_BOUNDS", 6 * len(shape.leaves)))
+    state = shape.n_x // (1 + shape.columns)
     if shape.columns or method.template == "radau":
-        result.append(("SYMDYN_STATE", shape.n_x // (1 + shape.columns)))
+        result.append(("SYMDYN_STATE", state))
+    if method.template == "radau":
+        result += _of_matrices(state, gathered.get("band"))
     if shape.n_rows:
         result.append(("SYMDYN_ROWS", shape.n_rows))
     if shape.unit_groups:
@@ -137,6 +142,14 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
     return result
 
 
+def _of_matrices(state: int, band: Band | None) -> list[tuple[str, int]]:
+    """Entries of the derivative of a state, rows that are eliminated with exchanges, numbers of their factors."""
+    if band is None:
+        return [("SYMDYN_ENTRIES", state**2), ("SYMDYN_BAND", state), ("SYMDYN_FACTORS", state**2)]
+    return [("SYMDYN_ENTRIES", len(band.columns)), ("SYMDYN_BAND", band.size), ("SYMDYN_FACTORS", band.factors),
+            ("SYMDYN_REDUCED", band.reduced), ("SYMDYN_LOWER", band.lower), ("SYMDYN_UPPER", band.upper)]
+
+
 def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads: bool, single: bool = False) -> dict[str, bool]:
     """Macros by which parts are left out.
 
@@ -146,6 +159,7 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads:
     """
     tableau = method.tableau
     return {"SYMDYN_EXPLICIT": tableau is not None, "SYMDYN_RADAU": method.template == "radau",
+            "SYMDYN_BANDED": gathered.get("band") is not None,
             "SYMDYN_GAUSS": method.template == "gauss", "SYMDYN_TAYLOR": method.template == "taylor",
             "SYMDYN_OWN_STEP": method.own_step, "SYMDYN_SLOPE_AT_END": method.slope_at_end,
             "SYMDYN_ORDER_8": method.order == 8,

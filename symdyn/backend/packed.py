@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from symdyn.backend.band import Band, band_of
 
 NAME = "jacobian_x_packed"
 # From so many states on, and with this part of the entries at most, sparse factors take less time than dense ones.
@@ -13,11 +16,23 @@ LEAST_STATES, LARGEST_PART = 100, 0.1
 
 @dataclass(frozen=True)
 class Places:
-    """Places of rows and columns, (n_e,), row by row, of a matrix of n rows and n columns."""
+    """Places of rows and columns, (n_e,), row by row, of a matrix of n rows and n columns; n_q: how many states are
+    coordinates, which come first."""
 
     n: int
     rows: np.ndarray
     columns: np.ndarray
+    n_q: int
+
+    @cached_property
+    def band(self) -> Band:
+        """The order in which the matrices of compiled implicit methods have a narrow band."""
+        return band_of(self)
+
+    def with_work(self) -> Places:
+        """With one more state at the end, the work of the loads, which depends on all others."""
+        n = self.n
+        return Places(n + 1, np.r_[self.rows, np.full(n, n)], np.r_[self.columns, np.arange(n)], self.n_q)
 
     @property
     def sparse(self) -> bool:

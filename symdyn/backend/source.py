@@ -18,6 +18,7 @@ import numpy as np
 
 import symdyn
 from symdyn import panels
+from symdyn.backend.band import Band
 from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.columns import Columns
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
@@ -25,7 +26,7 @@ from symdyn.backend.function import Function, Part
 from symdyn.backend.integrated import Shape, functions, switches
 from symdyn.backend.integrated import sizes as runtime_sizes
 from symdyn.backend.metadata import EventRecord, Metadata
-from symdyn.backend.methods import Method, method_of
+from symdyn.backend.methods import Method, method_of, needs_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
@@ -72,6 +73,7 @@ class Content:
     columns       of sensitivities, which are the last entries of z; carried: weights that are carried back besides those of x
     jacobians     those whose tapes are derivatives along directions
     rows          functions that take rows of states with a state in each lane
+    band          the order in which an implicit method eliminates the entries of the derivative by x; None: as a whole matrix
     """
 
     name: str
@@ -92,6 +94,7 @@ class Content:
     carried: int | None = None
     jacobians: Mapping[str, Columns] = field(default_factory=dict)
     rows: Sequence[str] = ()
+    band: Band | None = None
 
 
 @dataclass(frozen=True)
@@ -229,7 +232,8 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
              and not context["threads"] and method.template != "taylor")
-    called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
+    needs = needs_of(method, content.band is not None)
+    called = functions(needs, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
     return {"runtime": Parts(read, switches(method, shape, gathered, context["threads"], context["single"])),
             "runtime_sizes": runtime_sizes(method, shape, gathered),
             "integrated": called, "sensitive": shape.columns > 0, "resets": shape.resets, "held": shape.held,

@@ -7,10 +7,14 @@ import functools
 import hashlib
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from symdyn.backend.metadata import ModuleMetadata
+from symdyn.backend.packed import LEAST_STATES, Places
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SymdynError
 from symdyn.runtime.building.library import Library
@@ -37,6 +41,21 @@ def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightS
                         for one in dict.fromkeys(methods) for by in dict.fromkeys([columns, ()]) for parted in (False, True)]
 
 
+@dataclass(frozen=True)
+class _Provider:
+    """What gives a module its libraries, and where its derivative by x has entries."""
+
+    library: Callable[[str | RightSide], Library]
+    given: Callable[[], Places | None]
+
+    def __call__(self, what: str | RightSide) -> Library:
+        return self.library(what)
+
+    @property
+    def places(self) -> Places | None:
+        return self.given()
+
+
 class PortableModule:
     """A module that can be pickled.
 
@@ -48,7 +67,7 @@ class PortableModule:
         self._texts = Texts(module.backend)
         self._given = module
         self._functions = tuple(functions)
-        self.module = Module(module.metadata, self._provide, module.backend, module.fallback)
+        self.module = Module(module.metadata, _Provider(self._provide, module.jacobian_indices), module.backend, module.fallback)
         self.at_home = True
 
     def _provide(self, what: str | RightSide) -> Library:
@@ -65,8 +84,17 @@ class PortableModule:
     def _packed(self) -> bytes:
         for name in self._functions:
             self.module.library(name)
-        record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain()}
+        record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain(), "places": self._places()}
         return zlib.compress(json.dumps(record).encode())
+
+    def _places(self) -> list[Any] | None:
+        """Of many states whose derivative has few entries."""
+        if self.module.metadata.sizes.x < LEAST_STATES:
+            return None
+        there = self.module.jacobian_indices()
+        if there is None or not (there.sparse or there.band.pays):
+            return None
+        return [there.n, there.rows.tolist(), there.columns.tolist(), there.n_q]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _Arrived, (self.module.backend, self._packed)
@@ -98,4 +126,6 @@ def _module(backend: str, packed: bytes) -> Module:
                           "advance. Name it in `functions`")
         return texts.load(what)
 
-    return Module(metadata, provide, backend)
+    sent = record["places"]
+    there = None if sent is None else Places(sent[0], np.array(sent[1]), np.array(sent[2]), sent[3])
+    return Module(metadata, _Provider(provide, lambda: there), backend)

@@ -18,6 +18,7 @@ from symdyn.backend.metadata import (
     ModuleMetadata,
     ValidityRange,
 )
+from symdyn.backend.packed import NAME as PACKED
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
@@ -25,6 +26,7 @@ from symdyn.formulation.derivatives import second_named
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.printed.skipped import skipped
+from symdyn.functions.packed import band
 from symdyn.functions.sensitivities import column_names, held_names
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import given_rates, has_function, switches, tape_as_derived, tapes_of
@@ -82,7 +84,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
                    len(right_side.sensitivities), None if right_side.adjoint is None else len(right_side.adjoint),
                    {name: replace(made, tape=tapes[name]) for name, made in several.items()},
-                   tuple(name for name in names if second_named(name) and name not in several))
+                   tuple(name for name in names if second_named(name) and name not in several),
+                   band(equations, right_side.method, right_side.baumgarte, right_side.work) if PACKED in names else None)
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:

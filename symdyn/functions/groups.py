@@ -5,12 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 
-from symdyn.backend.methods import method_of
+from symdyn.backend.methods import method_of, needs_of
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES
+from symdyn.functions.packed import band
 from symdyn.functions.sensitivities import adjoints_of, functions_of
 from symdyn.functions.table import BATCH, CONSISTENCY, FUNCTIONS, STANDARD, STATICS
 from symdyn.functions.tapes import has_function
@@ -23,8 +24,11 @@ OF_CONTACTS = ("contact_gaps", "contact_directions", "contact_spheres")
 _OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
 
 
-def written(equations: Equations, functions: Sequence[str] | None, method: str | None) -> tuple[str, ...]:
+def written(equations: Equations, functions: Sequence[str] | None, method: str | None,
+            baumgarte: bool = False) -> tuple[str, ...]:
     """The functions that go into a file: those named, or the standard ones; with what the method of an integrator needs.
+
+    baumgarte   whether the right-hand side is stabilized by Baumgarte's method
 
     Raises SymdynError for what is no list of names, ArgumentError for functions that the equations do not have.
     """
@@ -37,7 +41,7 @@ def written(equations: Equations, functions: Sequence[str] | None, method: str |
         raise SymdynError(f"{equations.name}: functions is {shown(functions)}; pass a list of names such as "
                           "['rhs', 'mass_matrix']")
     if method is not None and "rhs" in names:
-        names = tuple(dict.fromkeys((*names, *method_of(method).needs)))
+        names = tuple(dict.fromkeys((*names, *needs_of(method_of(method), band(equations, method, baumgarte) is not None))))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = [n for n in FUNCTIONS if has_function(equations, n)]

@@ -7,6 +7,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from symdyn.backend.band import Band
+from symdyn.backend.methods import method_of
 from symdyn.backend.packed import NAME, Places
 from symdyn.formulation.equations import Equations
 from symdyn.tape.differentiate import reverse
@@ -24,6 +26,20 @@ def places(equations: Equations) -> Places | None:
     return _found[equations]
 
 
+def band(equations: Equations, method: str, baumgarte: bool = False, work: bool = False) -> Band | None:
+    """The order of elimination of an implicit method, where factors in it take less work than those of the whole matrix; None
+    where they do not, or for other methods.
+
+    baumgarte, work   as in symdyn.backend.right_side.RightSide; Baumgarte's method changes the places
+    """
+    if baumgarte or "jacobian_x" not in method_of(method).needs:
+        return None
+    there = places(equations)
+    if there is None:
+        return None
+    return (there.with_work() if work else there).band if there.band.pays else None
+
+
 def _looked_for(equations: Equations) -> Places | None:
     entries = equations.quantity("rhs").tolist()
     bits = {node: 1 << k for k, node in enumerate(_leaves(equations)) if node is not None}
@@ -37,7 +53,7 @@ def _looked_for(equations: Equations) -> Places | None:
     needs = [bits[e] if isinstance(e, Node) else 0 for e in entries]
     result = [[k for k, bit in enumerate(reversed(bin(need)[2:])) if bit == "1"] for need in needs]
     rows = np.repeat(np.arange(len(entries)), [len(row) for row in result])
-    return Places(len(entries), rows, np.array([k for row in result for k in row], dtype=int))
+    return Places(len(entries), rows, np.array([k for row in result for k in row], dtype=int), len(equations.symbols.coordinates))
 
 
 def packed_tape(equations: Equations) -> Tape:

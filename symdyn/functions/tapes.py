@@ -119,6 +119,9 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
             by_x = np.vstack([by_x, equations.quantity("power_x").reshape(1, -1)])
             by_x = np.column_stack([by_x, np.zeros(len(by_x), dtype=object)])
         tapes["jacobian_x"] = Tape.of(equations.recorder, jacobian_x=by_x)
+    if work and PACKED in names:
+        values = [*_only_output(tapes[PACKED]).entries, *equations.quantity("power_x").ravel()]
+        tapes[PACKED] = Tape(equations.recorder, {PACKED: Output.of(PACKED, np.array(values, dtype=object))})
     return tapes
 
 

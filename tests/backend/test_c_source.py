@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 
 from symdyn import systems
+from symdyn.emission import write_source
 from symdyn.errors import SymdynError
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
+from symdyn.lab.stiff_cables import elastic_cable
 from symdyn.pipeline import emit
 from tests import mechanisms
 from tests.helpers import swept
@@ -62,6 +64,15 @@ def test_results_without_entries(derived: Callable[..., Any], write: Callable[..
     equations = derived("pendulum")
     folder = write(equations, "c", ["rhs", "jacobian_inputs"])
     assert check(folder, "pendulum").endswith("all results agree\n")
+
+
+def test_a_method_with_factors_in_a_band_is_in_one_file(tmp_path: Path) -> None:
+    """The order of elimination and the entries of the derivative stand in it, and these agree with values of more digits."""
+    write_source(emit(elastic_cable(10).embedding(), "c", ["rhs"], method="radau5"), tmp_path)
+    text = (tmp_path / "elastic_cable_10.c").read_text()
+    assert "static const int symdyn_sequence[36] = {\n" in text and "#define SYMDYN_LOWER 3\n" in text
+    printed = check(tmp_path, "elastic_cable_10")
+    assert printed.endswith("all results agree\n") and "jacobian_x_packed" in printed
 
 
 def test_example_notices_a_wrong_number(derived: Callable[..., Any], write: Callable[..., Path]) -> None:

@@ -6,16 +6,19 @@ import ctypes
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from symdyn import panels
+from symdyn.backend.band import Band
 from symdyn.backend.integrated import Shape, sizes, switches
 from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import METHODS
 from symdyn.backend.methods.gauss import COEFFICIENTS
+from symdyn.backend.packed import Places
 from symdyn.backend.source import _shipped, template_folders
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
@@ -39,7 +42,7 @@ def build(tmp_path: Path) -> Build:
     def library(text: str, *options: str) -> ctypes.CDLL:
         threads = "".join(f"#define {name} 0\n" for name in ("SYMDYN_THREADS", "SYMDYN_SINGLE") if name not in text)
         (tmp_path / "main.c").write_text(threads + text)
-        made = tmp_path / "main.so"
+        made = tmp_path / f"main_{len(list(tmp_path.iterdir()))}.so"  # one that is loaded is not loaded again
         done = subprocess.run([*require_compiler().command, *STRICT, *options, f"-I{RUNTIME}", f"-I{tmp_path}", "-o", made,
                                tmp_path / "main.c", "-lm"], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
@@ -50,16 +53,16 @@ def build(tmp_path: Path) -> Build:
 
 
 def integrator(method: str, shape: Shape, functions: dict[str, str], tmp_path: Path, further: str = "",
-               **tables: Any) -> str:
+               band: Band | None = None, **tables: Any) -> str:
     """A text that includes runtime.c with a model: statements of its functions by their names."""
     record = METHODS[method]
-    gathered = {"second_order": True} if method == "gauss" else {}
-    context = {"method": record, "unit_groups": shape.unit_groups, "projection": tables.get("projection"), "panels": panels,
-               "has_events": bool(shape.events), "events": shape.events, "resets": shape.resets, "n_x": shape.n_x,
-               "held": shape.held, "event_leaves": shape.leaves, "gauss": COEFFICIENTS}
+    gathered: dict[str, Any] = {"second_order": True} if method == "gauss" else {}
     if method.startswith("radau"):
         assert record.gather is not None
-        context |= record.gather(None, None, None, None)
+        gathered.update(record.gather(SimpleNamespace(band=band)))
+    context = {"method": record, "unit_groups": shape.unit_groups, "projection": tables.get("projection"), "panels": panels,
+               "has_events": bool(shape.events), "events": shape.events, "resets": shape.resets, "n_x": shape.n_x,
+               "held": shape.held, "event_leaves": shape.leaves, "gauss": COEFFICIENTS, **gathered}
     tables_text = _shipped(*template_folders()).get_template("c/interface.c.jinja").render(context)
     bodies = "".join(f"static int symdyn_{name}{BOUNDED if name.endswith('_of') else SIGNATURE} {{\n(void)problem;\n"
                      f"{'' if name.endswith('_of') else '(void)t, (void)x;'}\n{body}\nreturn 0;\n}}\n"
@@ -123,6 +126,157 @@ def test_an_oscillator(method: str, build: Build, tmp_path: Path) -> None:
     assert report.status == STATUS.DONE and report.t == 10.0 and report.n_evaluations > report.n_steps > 5
     back = Run(library, [np.cos(10.0), -np.sin(10.0)], (10.0, 0.0), 1e-11).at(np.array([0.0]))
     np.testing.assert_allclose(back, [[1.0, 0.0]], rtol=0, atol=2e-8)
+
+
+BAND = """
+#include "band.h"
+int factorize(int n, int lower, int upper, double *A, double *B, double *scale, int *order);
+int factorize(int n, int lower, int upper, double *A, double *B, double *scale, int *order) {
+    return B ? symdyn_band_eliminate(n, lower, upper, A, B, scale, order)
+             : symdyn_band_eliminate(n, lower, upper, A, 0, scale, order);
+}
+void solve(int n, int lower, int upper, const double *A, const double *B, const int *order, double *x, double *y);
+void solve(int n, int lower, int upper, const double *A, const double *B, const int *order, double *x, double *y) {
+    if (B)
+        symdyn_band_substitute(n, lower, upper, A, B, order, x, y);
+    else
+        symdyn_band_substitute(n, lower, upper, A, 0, order, x, 0);
+}
+"""
+
+
+class Banded:
+    """A matrix in a band, real or complex, factorized by a library made of band.h."""
+
+    def __init__(self, library: ctypes.CDLL, matrix: np.ndarray, lower: int, upper: int) -> None:
+        n, self.library, self.is_complex = len(matrix), library, np.iscomplexobj(matrix)
+        self.sizes = n, lower, upper
+        height = 2 * lower + upper + 1
+        parts = np.zeros((2, n, height))
+        for i, j in np.argwhere(matrix):
+            assert -upper <= i - j <= lower
+            parts[:, j, lower + upper + i - j] = matrix[i, j].real, matrix[i, j].imag
+        self.A, self.B = parts[0].copy(), parts[1].copy() if self.is_complex else None
+        largest = np.abs(matrix).max(axis=1)
+        scale = np.append(1 / np.where(largest > 0, largest, 1), np.zeros(lower))
+        self.order = np.zeros(n, dtype=np.intc)
+        self.singular = library.factorize(*self.sizes, pointer(self.A), self._second(self.B), pointer(scale), pointer(self.order))
+
+    def _second(self, part: np.ndarray | None) -> ctypes.c_void_p | None:
+        return None if part is None else pointer(part)
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        n, lower, upper = self.sizes
+        before = lower + upper
+        padded = np.concatenate([np.full(before, 7.0), right, np.full(lower, 7.0)])
+        x, y = padded.real.copy(), padded.imag.copy()
+        inner = [ctypes.c_void_p(v.ctypes.data + 8 * before) for v in (x, y)]
+        self.library.solve(*self.sizes, pointer(self.A), self._second(self.B), pointer(self.order), *inner)
+        assert (np.delete(x, np.arange(before, before + n)) == 7).all()  # what lies next to the numbers stays
+        return (x + 1j * y if self.is_complex else x)[before:before + n]
+
+
+def random_band(rng: np.random.Generator, n: int, lower: int, upper: int, is_complex: bool) -> np.ndarray:
+    """With entries on the main diagonal that are mostly zero, so that rows must be exchanged."""
+    matrix = rng.normal(size=(n, n)) + (1j * rng.normal(size=(n, n)) if is_complex else 0)
+    matrix = np.triu(np.tril(matrix, upper), -lower)
+    np.fill_diagonal(matrix, np.where(rng.random(n) < (0.7 if lower and upper else 0), 0, np.diag(matrix) + 2))
+    return matrix
+
+
+@pytest.mark.parametrize("is_complex", [False, True])
+def test_bands_are_solved_as_whole_matrices(is_complex: bool, build: Build) -> None:
+    """Against LAPACK: bands of all widths, rows of sizes that differ by 24 decades, up to what the condition leaves."""
+    library, rng, exchanged, worst = build(BAND), np.random.default_rng(8), 0, 0.0
+    for n in (1, 2, 3, 5, 9, 30):
+        for lower, upper in {(min(a, n - 1), min(b, n - 1)) for a in (0, 1, 2, 4, 29) for b in (0, 1, 3, 29)}:
+            matrix = random_band(rng, n, lower, upper, is_complex)
+            if np.linalg.cond(matrix) > 1e6:
+                continue
+            right = rng.normal(size=n) + (1j * rng.normal(size=n) if is_complex else 0)
+            wanted = np.linalg.solve(matrix, right)
+            rows = 10.0**rng.integers(-12, 12, n)
+            banded = Banded(library, rows[:, None] * matrix, lower, upper)
+            assert banded.singular == 0
+            exchanged += int((banded.order != np.arange(n)).sum())
+            worst = max(worst, float(np.abs(banded.solve(rows * right) - wanted).max() / np.abs(wanted).max()))
+    assert worst < 1e-9 and exchanged > 100
+
+
+@pytest.mark.parametrize("is_complex", [False, True])
+def test_singular_bands_are_found(is_complex: bool, build: Build) -> None:
+    """A column of zeros, a row of zeros, rows that are multiples of each other, at every place; not a number."""
+    library, n = build(BAND), 6
+    unit = 2j if is_complex else 1.0  # with it elimination is exact
+    for k in range(n):
+        regular = np.diag(np.full(n, 4 * unit)) + np.diag(np.full(n - 1, unit), 1) + np.diag(np.full(n - 1, unit), -1)
+        assert Banded(library, regular, 1, 1).singular == 0
+        for axis in range(2):
+            matrix = regular.copy()
+            matrix[(k, slice(None)) if axis else (slice(None), k)] = 0
+            assert Banded(library, matrix, 1, 1).singular == 1
+        pair = slice(min(k, n - 2), min(k, n - 2) + 2)
+        matrix = np.diag(np.full(n, 4 * unit))
+        matrix[pair, pair] = unit * np.array([[1, 2], [2, 4]])
+        assert Banded(library, matrix, 1, 1).singular == 1
+        matrix[pair, pair] = np.nan
+        assert Banded(library, matrix, 1, 1).singular == 1
+
+
+# Masses in a row on springs and dampers, their speeds one after the other behind their positions; the last state integrates the
+# first position, another one is a filter. Stiff: 1e6 N/m on 1 kg.
+ROW = {
+    "field": """enum { N = SYMDYN_NQ };
+for (int i = 0; i < N; i++) {
+    const double left = i > 0 ? x[i - 1] : 0.0, right = i < N - 1 ? x[i + 1] : 0.0;
+    const double before = i > 0 ? x[N + i - 1] : 0.0, behind = i < N - 1 ? x[N + i + 1] : 0.0;
+    out[i] = x[N + i];
+    out[N + i] = 1e6*(left + right - 2.0*x[i]) + 1e3*(before + behind - 2.0*x[N + i]) - x[i]*x[i]*x[i] - x[2*N];
+}
+out[2*N] = 50.0*(x[1] - x[2*N]);
+out[2*N + 1] = x[0];""",
+    "jacobian_x_at": """enum { N = SYMDYN_NQ, S = 2*N + 2 };
+for (int k = 0; k < S*S; k++) out[k] = 0.0;
+for (int i = 0; i < N; i++) {
+    double *const row = out + (N + i)*S;
+    out[i*S + N + i] = 1.0;
+    row[i] = -2e6 - 3.0*x[i]*x[i];
+    row[N + i] = -2e3;
+    row[2*N] = -1.0;
+    if (i > 0) row[i - 1] = 1e6;
+    if (i > 0) row[N + i - 1] = 1e3;
+    if (i < N - 1) row[i + 1] = 1e6;
+    if (i < N - 1) row[N + i + 1] = 1e3;
+}
+out[2*N*S + 1] = 50.0;
+out[2*N*S + 2*N] = -50.0;
+out[(2*N + 1)*S] = 1.0;"""}
+
+
+@pytest.mark.parametrize("method", ["radau", "radau5"])
+def test_a_row_of_masses_by_factors_in_a_band(method: str, build: Build, tmp_path: Path) -> None:
+    """The same steps as with whole matrices, forwards and backwards; one column depends on none, one on nearly all."""
+    n = 12
+    shape = Shape({"q": n, "u": n, "z": 2, "inputs": 0}, 0, (), ())
+    pattern = np.zeros((2 * n + 2, 2 * n + 2), dtype=bool)
+    pattern[:n, n:2 * n] = np.eye(n)
+    near = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) < 2
+    pattern[n:2 * n, :n] = pattern[n:2 * n, n:2 * n] = near
+    pattern[n:2 * n, 2 * n] = True
+    pattern[2 * n, [1, 2 * n]] = pattern[2 * n + 1, 0] = True
+    band = Places(2 * n + 2, *np.nonzero(pattern), n).band
+    assert (band.reduced, band.size) == (n, n + 1)
+    packed = (f"double whole[{(2 * n + 2)**2}];\nsymdyn_jacobian_x_at(problem, t, x, whole);\n"
+              + "\n".join(f"out[{k}] = whole[{place}];" for k, place in enumerate(np.flatnonzero(pattern))))
+    times, found = np.linspace(0, 0.5, 11), []
+    for given, functions in ((None, ROW), (band, {**ROW, "jacobian_x_packed_at": packed})):
+        library = build(integrator(method, shape, functions, tmp_path, band=given))
+        run = Run(library, [1.0] * n + [0.0] * (n + 2), (0.0, 0.5), 1e-9)
+        ahead = run.at(times)
+        back = Run(library, [*ahead[1]], (1.0, 0.999), 1e-9).at(np.array([0.999]))
+        found.append((ahead, back, run.report(), library.symdyn_simulation_size()))
+    assert np.abs(found[0][0] - found[1][0]).max() < 1e-9 and np.abs(found[0][1] - found[1][1]).max() < 1e-6
+    assert found[0][2].n_steps == found[1][2].n_steps > 30 and found[0][3] > 1.5 * found[1][3]
 
 
 CIRCLE = {

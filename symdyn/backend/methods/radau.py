@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 from symdyn.backend.methods.record import Method
 
@@ -99,10 +101,17 @@ SOURCE = (
     "Springer 1996, section IV.8 (Newton's method, error estimate; 3 stages); the same, Stiff differential equations solved by",
     "Radau methods, J. Comput. Appl. Math. 111 (1999) 93-111 (5 stages).")
 
+
+
+def _gather(collocation: Collocation) -> Callable[..., Mapping[str, Any]]:
+    """The coefficients, and the order in which the matrix has a narrow band."""
+    return lambda content, *_: {"collocation": collocation, "band": content.band}
+
+
 RADAU = Method(
     "radau", "Radau IIA of 5 stages with the exact Jacobian: order 9, error estimate of order 5, dense output of order 6",
-    6, "radau", SOURCE, needs=("jacobian_x",), gather=lambda *_: {"collocation": FIVE_STAGES})
+    6, "radau", SOURCE, needs=("jacobian_x",), gather=_gather(FIVE_STAGES))
 
 RADAU5 = Method(
     "radau5", "Radau IIA of 3 stages with the exact Jacobian: order 5, error estimate of order 3, dense output of order 4",
-    4, "radau", SOURCE, needs=("jacobian_x",), gather=lambda *_: {"collocation": THREE_STAGES})
+    4, "radau", SOURCE, needs=("jacobian_x",), gather=_gather(THREE_STAGES))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symdyn.backend.right_side import METHOD
 from symdyn.errors import ArgumentError
@@ -73,9 +73,9 @@ def _not_collocated(module: Module, inputs: Inputs | None) -> str:
     return _constrained(module) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
-def _dense(stages: int) -> Callable[[Module, Inputs | None], str]:
-    """Matrices of the compiled implicit methods have all entries: that of the derivative, and a real and an imaginary part for
-    each two stages."""
+def _implicit(stages: int) -> Callable[[Module, Inputs | None], str]:
+    """Whether the matrices of a compiled implicit method are too large: that of the derivative, and a real and an imaginary part
+    for each two stages."""
 
     def unfit(module: Module, inputs: Inputs | None) -> str:
         n = module.metadata.sizes.x
@@ -83,6 +83,10 @@ def _dense(stages: int) -> Callable[[Module, Inputs | None], str]:
         if size <= LARGEST_MATRICES:
             return ""
         there = module.jacobian_indices()
+        if there is not None and there.band.pays:
+            size = 8 * (there.band.factors * (stages + 1) + len(there.rows))
+            if size <= LARGEST_MATRICES:
+                return ""
         instead = ("'Radau' of SciPy, whose factors have few entries here" if there is not None and there.sparse else
                    f"'{DEFAULT}'")
         return f"its matrices of {n} states take {size / 2**30:.1f} GiB; use method={instead}"
@@ -94,8 +98,8 @@ COMPILED = {m.name: m for m in (
     CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
     CompiledMethod(SERIES, unfit=_not_expanded),
     # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
-    CompiledMethod("radau", ("jacobian_x",), _dense(5), kinked=0.01),
-    CompiledMethod("radau5", ("jacobian_x",), _dense(3), kinked=0.01),
+    CompiledMethod("radau", ("jacobian_x",), _implicit(5), kinked=0.01),
+    CompiledMethod("radau5", ("jacobian_x",), _implicit(3), kinked=0.01),
 )}
 
 
@@ -110,6 +114,23 @@ def unfit(module: Module, method: str, inputs: Inputs | None) -> str:
     record = COMPILED[method]
     missing = [n for n in record.needs if n not in module.metadata.functions]
     return f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, inputs)
+
+
+def factors_of(module: Module, method: Any, way: str) -> str:
+    """How an implicit method factorizes its matrices, in words; "" for other methods.
+
+    way   of stabilization: Baumgarte's changes the derivative
+    """
+    compiled = is_compiled(method) and "jacobian_x" in COMPILED[method].needs
+    if not compiled and not (isinstance(method, str) and method in ("Radau", "BDF")):
+        return ""
+    there = module.jacobian_indices() if way != "baumgarte" else None
+    if there is not None and compiled and there.band.pays:
+        band = there.band
+        return f"banded: {band.size} of {there.n} states, {band.lower} diagonals below and {band.upper} above the main one"
+    if there is not None and not compiled and there.sparse:
+        return f"sparse: {there.n} states, {len(there.rows)} entries of the derivative"
+    return f"dense: {module.metadata.sizes.x} states"
 
 
 def is_compiled(method: object) -> bool:

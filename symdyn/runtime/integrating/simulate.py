@@ -30,7 +30,7 @@ from symdyn.runtime.integrating.contacts import TooFast, check_overlap, run_cont
 from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
-from symdyn.runtime.integrating.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
+from symdyn.runtime.integrating.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, factors_of, is_compiled
 from symdyn.runtime.integrating.moreau import MOREAU, check_moreau, run_moreau
 from symdyn.runtime.integrating.moreau_groups import check_spheres_apart
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -155,7 +155,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen]), *of_columns))
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
                             work, (request.rtol, float(request.atol.max(initial=0.0))), why,
-                            partial(_repeated, module, replace(whole, inputs=free), method), asked)
+                            partial(_repeated, module, replace(whole, inputs=free), method), asked,
+                            partial(factors_of, module, method, whole.stabilization.way))
         if outcome.interrupted:
             raise SimulationInterrupted(solution, outcome.message)
         if not outcome.success:

@@ -74,9 +74,10 @@ class Solution:
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
                  seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "",
-                 repeat: Callable[[np.ndarray], np.ndarray] | None = None, asked: Asked | None = None) -> None:
+                 repeat: Callable[[np.ndarray], np.ndarray] | None = None, asked: Asked | None = None,
+                 factors: Callable[[], str] = str) -> None:
         self.module = module
-        self._repeat = repeat
+        self._repeat, self._factors = repeat, factors
         self.t = outcome.t
         self.x = outcome.x[:, :module.metadata.sizes.x]
         self._columns = outcome.x[:, module.metadata.sizes.x:] if asked is not None and asked.columns else None
@@ -153,6 +154,17 @@ class Solution:
         near = difflib.get_close_matches(name, known, 3)
         raise ArgumentError(f"{self.module.name}: the solution has no {shown(name)}; "
                             + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
+
+    @cached_property
+    def factors(self) -> str:
+        """How an implicit method factorized its matrices: "banded: ...", "dense: ...", or "sparse: ..." by SciPy, with the sizes;
+        "" for other methods.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.simulate((0, 1), method="Radau").factors
+        'dense: 2 states'
+        """
+        return self._factors()
 
     @property
     def y(self) -> np.ndarray:

@@ -53,6 +53,8 @@ def facts(solution: Solution) -> list[tuple[str, str]]:
     rows += [("Steps", f"{solution.n_steps}, and {solution.n_rejected} rejected"), ("Evaluations", str(solution.nfev))]
     if solution.njev:
         rows.append(("Jacobians", f"{solution.njev}, and {solution.nlu} factorizations"))
+    if solution.factors:
+        rows.append(("Factors", solution.factors))
     inside = solution.integrator_seconds
     rows.append(("Time", _seconds(solution.seconds)
                  + (f", of which {_seconds(inside)} inside the integrator" if inside is not None else "")))

@@ -1,72 +1,12 @@
-// Implicit collocation by simplified Newton iteration: see symdyn/backend/methods/radau.py. Matrices are stored by columns.
+// Implicit collocation by simplified Newton iteration: see symdyn/backend/methods/radau.py.
 #pragma once
 
 #include "run.h"
-
-// Factorize A + i B with exchanges among the rows of coordinates, then among the others: entries stay zero where q_dot = u, and
-// units are not compared with each other. Inverses on the diagonal. Returns 1 if it is singular.
-static int symdyn_newton_factorize(double *A, double *B, int *order) {
-    for (int k = 0; k < SYMDYN_STATE; k++) {
-        double *const a = A + k * SYMDYN_STATE, *const b = B + k * SYMDYN_STATE, most = 0.0;
-        for (int i = k; i < (k < SYMDYN_NQ ? SYMDYN_NQ : SYMDYN_STATE); i++) {
-            if (fabs(a[i]) + fabs(b[i]) > most) {
-                most = fabs(a[i]) + fabs(b[i]);
-                order[k] = i;
-            }
-        }
-        if (!(most > 0.0)) return 1;
-        for (int from = k, to = order[k]; from < SYMDYN_STATE * SYMDYN_STATE; from += SYMDYN_STATE, to += SYMDYN_STATE) {
-            const double p = A[from], q = B[from];
-            A[from] = A[to];
-            B[from] = B[to];
-            A[to] = p;
-            B[to] = q;
-        }
-        const double u = a[k] / most, v = b[k] / most, size = most * (u * u + v * v);
-        a[k] = u / size;
-        b[k] = -v / size;
-        for (int i = k + 1; i < SYMDYN_STATE; i++) {
-            const double p = a[i];
-            a[i] = p * a[k] - b[i] * b[k];
-            b[i] = p * b[k] + b[i] * a[k];
-        }
-        for (int j = k + 1; j < SYMDYN_STATE; j++) {
-            double *restrict const c = A + j * SYMDYN_STATE, *restrict const d = B + j * SYMDYN_STATE;
-            const double p = c[k], q = d[k];
-            if (p != 0.0 || q != 0.0) {
-                for (int i = k + 1; i < SYMDYN_STATE; i++) {
-                    c[i] -= p * a[i] - q * b[i];
-                    d[i] -= p * b[i] + q * a[i];
-                }
-            }
-        }
-    }
-    return 0;
-}
-
-// Solve (A + i B) w = x + i y, in place, by these factors: for the state, and for every column of sensitivities.
-static void symdyn_newton_solve(const double *A, const double *B, const int *order, double *restrict x, double *restrict y) {
-    for (int first = 0; first < SYMDYN_NX; first += SYMDYN_STATE, x += SYMDYN_STATE, y += SYMDYN_STATE) {
-        for (int k = 0; k < SYMDYN_STATE; k++) {
-            const double p = x[order[k]], q = y[order[k]];
-            x[order[k]] = x[k];
-            y[order[k]] = y[k];
-            x[k] = p;
-            y[k] = q;
-        }
-        for (int step = 0; step < 2 * SYMDYN_STATE; step++) {  // forth by columns of L, back by those of U
-            const int back = step >= SYMDYN_STATE, k = back ? (2 * SYMDYN_STATE - 1) - step : step;
-            const double *const a = A + k * SYMDYN_STATE, *const b = B + k * SYMDYN_STATE;
-            const double p = back ? x[k] * a[k] - y[k] * b[k] : x[k], q = back ? x[k] * b[k] + y[k] * a[k] : y[k];
-            x[k] = p;
-            y[k] = q;
-            for (int i = back ? 0 : k + 1; i < (back ? k : SYMDYN_STATE); i++) {
-                x[i] -= p * a[i] - q * b[i];
-                y[i] -= p * b[i] + q * a[i];
-            }
-        }
-    }
-}
+#if SYMDYN_BANDED
+#include "newton_banded.h"
+#else
+#include "newton_dense.h"
+#endif
 
 // out += factor matrix in, by vectors of states
 static void symdyn_mix(
@@ -104,24 +44,20 @@ static int symdyn_begin(symdyn_run *run) {
 // The matrices of Newton's iteration for steps of length h from (t, x), factorized. Returns 0 or a failure.
 static int symdyn_prepare(symdyn_run *run, double h) {
     if (run->method.theta > 0.01 && !run->method.current) {
+#if SYMDYN_BANDED
+        const int reason = symdyn_jacobian_x_packed_at(&run->problem, run->t, run->x, run->method.jacobian);
+#else
         const int reason = symdyn_jacobian_x_at(&run->problem, run->t, run->x, run->method.jacobian);
+#endif
         run->n_jacobians++;
         if (reason) return symdyn_fail(run, SYMDYN_FIELD_FAILED, reason, -1, run->t, run->x);
-        for (int i = 0; i < SYMDYN_STATE * SYMDYN_STATE; i++)
+        for (int i = 0; i < SYMDYN_ENTRIES; i++)
             if (!(fabs(run->method.jacobian[i]) <= symdyn_huge)) run->method.jacobian[i] = 0.0;  // infinite ones: no help
         run->method.current = 1;
     }
     for (int k = 0; k < SYMDYN_ROOTS; k++) {
-        for (int i = 0; i < SYMDYN_STATE; i++)
-            for (int j = 0; j < SYMDYN_STATE; j++)
-                run->method.re[k][j * SYMDYN_STATE + i] = -run->method.jacobian[i * SYMDYN_STATE + j];
-        for (int i = 0; i < SYMDYN_STATE * SYMDYN_STATE; i++) run->method.im[k][i] = 0.0;
-        for (int i = 0; i < SYMDYN_STATE; i++) {
-            run->method.re[k][i * (SYMDYN_STATE + 1)] += symdyn_roots[k][0] / h;
-            run->method.im[k][i * (SYMDYN_STATE + 1)] = symdyn_roots[k][1] / h;
-        }
         run->n_factorizations++;
-        if (symdyn_newton_factorize(run->method.re[k], run->method.im[k], run->method.order[k])) return SYMDYN_STEP_TOO_SMALL;
+        if (symdyn_newton_matrix(&run->method, h, k)) return SYMDYN_STEP_TOO_SMALL;
     }
     return 0;
 }
@@ -148,8 +84,7 @@ static int symdyn_newton(symdyn_run *run, double h, double z[][SYMDYN_NX]) {
         }
         symdyn_mix(SYMDYN_STAGES, SYMDYN_STAGES, symdyn_inverse[0], -1.0 / h, z, f);
         symdyn_mix(2 * SYMDYN_ROOTS, SYMDYN_STAGES, symdyn_part[0], 1.0, f, r);
-        for (int k = 0; k < SYMDYN_ROOTS; k++)
-            symdyn_newton_solve(run->method.re[k], run->method.im[k], run->method.order[k], r[2 * k], r[2 * k + 1]);
+        for (int k = 0; k < SYMDYN_ROOTS; k++) symdyn_newton_solve(&run->method, k, r[2 * k], r[2 * k + 1]);
         symdyn_mix(SYMDYN_STAGES, 2 * SYMDYN_ROOTS, symdyn_join[0], 1.0, r, change);
         for (int k = 0; k < SYMDYN_STAGES; k++)
             for (int i = 0; i < SYMDYN_NX; i++) z[k][i] += change[k][i];
@@ -185,7 +120,7 @@ static int symdyn_gap(symdyn_run *run, double h, double z[][SYMDYN_NX], double e
     const int failure = symdyn_eval(run, run->t + symdyn_extra * h, y, e[1]);
     if (failure) return failure;
     for (int i = 0; i < SYMDYN_NX; i++) e[1][i] -= slope[0][i] + symdyn_extra_slope[SYMDYN_STAGES] / h * e[0][i];
-    symdyn_newton_solve(run->method.re[0], run->method.im[0], run->method.order[0], e[1], none);
+    symdyn_newton_solve(&run->method, 0, e[1], none);
     for (int i = 0; i < SYMDYN_NX; i++) y[i] = e[1][i] + symdyn_off * e[0][i];
     const double gap = 0.5 * sqrt(fmin(symdyn_square(run, e[1], x_new), symdyn_square(run, y, x_new))),
                  part = h / run->method.h_gap;
@@ -220,7 +155,7 @@ static int symdyn_try(symdyn_run *run, double h, double t_new, double *x_new, do
     for (int again = 0; again < 2; again++) {
         double *const estimate = again ? y : e[0], none[SYMDYN_NX] = {0.0};
         for (int i = 0; i < SYMDYN_NX; i++) estimate[i] = (again ? f[i] : run->xd[i]) + sum[0][i];
-        symdyn_newton_solve(run->method.re[0], run->method.im[0], run->method.order[0], estimate, none);
+        symdyn_newton_solve(&run->method, 0, estimate, none);
         *err = run->method.ease * sqrt(symdyn_square(run, estimate, x_new));
         // In the first step, and after a rejection, what is stiff in the error is damped once more.
         if (*err <= 1.0 || (run->method.warm && !run->rejected)) break;
