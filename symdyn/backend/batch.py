@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from symdyn.backend.columns import Columns
 from symdyn.backend.dialect import Dialect, read_dialect
 from symdyn.backend.function import Function
 from symdyn.backend.program import Program, build
@@ -37,7 +38,7 @@ class Batch:
 
 
 def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str, Tape], titles: Mapping[str, str],
-             places: Mapping[str, tuple[str, int]], singular_fallback: Mapping[str, Tape],
+             places: Mapping[str, tuple[str, int]], singular_fallback: Mapping[str, Tape], columns: Mapping[str, Columns],
              names: Sequence[str] = ("rhs",)) -> Batch:
     """Functions of a program on vectors.
 
@@ -48,10 +49,11 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     dialect = read_dialect(folder / "batch")
     dialect = replace(dialect, operations={
         op: f"{f.name}({', '.join(f'VECTOR({{{k}}})' for k in range(len(f.arguments)))})" for op, f in available.items()})
-    built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program).functions
+    built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program,
+                  columns={name: those for name, those in columns.items() if name in names}, vectors=dialect).functions
     functions = {f.name: _whole(f.regular or f) for f in built if f.name in names}
-    text = "\n".join(line for function in functions.values() for part in (function.parts or (function,)) for lines in
-                     (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
+    text = "\n".join(line for function in functions.values() for way in function.ways for part in (way.parts or (way,))
+                     for lines in (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
     used = set(re.findall(rf"\b{_PREFIX}\w+", text))
     return Batch(functions, tuple(f for f in available.values() if f.name in used))
 

@@ -85,6 +85,12 @@ class Function:
         return True
 
     @property
+    def ways(self) -> list[Function]:
+        """This function and those that it calls."""
+        called = [way for way in (self.regular, self.singular_fallback, self.values) if way is not None]
+        return [self, *[inner for way in (*called, *[a.function for a in self.along]) for inner in way.ways]]
+
+    @property
     def size(self) -> int:
         """Number of entries of the result."""
         total = 1

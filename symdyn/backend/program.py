@@ -82,8 +82,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                       + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    inlined = {w.name: w.inlined for f in (*like.functions, *like.common)
-               for w in (f, f.regular, f.singular_fallback) if w} if like else {}
+    inlined = {w.name: w.inlined for f in (*like.functions, *like.common) for w in f.ways} if like else {}
     drafts = Drafts(dialect, places, hoisted, codes, late, inlined)
     vectored = [name for name in tapes if name in columns] if vectors is not None else []
     ways = {f"{name}_{REGULAR}" if name in singular_fallback else name: (name, tape) for name, tape in tapes.items()
@@ -94,7 +93,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     for name in vectored:
         called = f"{name}_{REGULAR}" if name in singular_fallback else name
         written[called] = _columns(columns[name], called, titles[name], drafts, replace(
-            drafts, dialect=vectors or dialect, late=set(), inlined={}))
+            drafts, dialect=vectors or dialect, late=set(), inlined=inlined))
     functions = tuple(
         _either(name, titles[name], written[f"{name}_{REGULAR}"], written[f"{name}_{SINGULAR_FALLBACK}"])
         if name in singular_fallback else written[name] for name in tapes)

@@ -167,7 +167,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     if backend == "c":
         shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, places,
-                                       content.singular_fallback)
+                                       content.singular_fallback, content.jacobians)
         lanes = on_vectors() if batch and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
@@ -276,7 +276,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     # A file with the name of a standard module would be imported in its place by whatever runs beside it.
     # The runtime in C has names that begin with symdyn_.
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
-    written = [way for f in program.functions for way in _ways(f)]
+    written = [way for f in program.functions for way in f.ways]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
     wanted = standalone and states > 0
     reference = None
@@ -363,12 +363,6 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),
     }
-
-
-def _ways(f: Function) -> list[Function]:
-    """A function and those that it calls."""
-    called = [way for way in (f.regular, f.singular_fallback, f.values) if way is not None] + [a.function for a in f.along]
-    return [f, *[inner for way in called for inner in _ways(way)]]
 
 
 def _metadata_lines(metadata: Metadata) -> list[tuple[str, str]]:

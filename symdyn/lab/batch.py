@@ -10,6 +10,7 @@ import re
 import subprocess
 import tempfile
 import time as clock
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 
 import symdyn as sd
 from symdyn.emission import emit
-from symdyn.errors import SymdynError
+from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.lab.figures import Figure, print_figures
 from symdyn.lab.peers.benchmark import random_state
@@ -39,6 +40,9 @@ SINGLE = 200
 # Of each piece the best timing counts, as of each of those that are alone.
 PIECES = 50
 ROUNDS = 5
+FEW = 10
+DIFFERENTIATED: tuple[tuple[str, dict[str, int], tuple[int, ...]], ...] = (
+    ("double_pendulum", {}, (1, 4, 12)), ("n_link_pendulum", {"n": 5}, (1, 8, 16)), ("spatial_chain", {"n": 7}, (1, 8, 60)))
 LOOPS = ("four_bar", "andrews_squeezer", "double_wishbone", "rolling_disc")
 
 
@@ -170,7 +174,38 @@ def loops() -> Iterator[Figure]:
         yield f"{name}: the bits of one motion", float(same), "", ">= 1"
 
 
-GROUPS = (chain, pendulums, loops)
+def sensitivities() -> Iterator[Figure]:
+    """Motions with derivatives by few and by many numbers: a motion in each lane, and one after the other, with several columns of
+    one motion in the lanes where these are many. Times of the processor."""
+    for name, sizes, counts in DIFFERENTIATED:
+        module = sd.systems.get(name, **sizes).compile(backend="c")
+        rng, n_q, n_u = np.random.default_rng(6), module.metadata.sizes.q, module.metadata.sizes.u
+        q, u, span = rng.uniform(-1, 1, (SINGLE, n_q)), rng.uniform(-1, 1, (SINGLE, n_u)), np.array([0.0, 2.0])
+        names = [*[f"{x}(0)" for x in module.metadata.x], *module.metadata.parameters]
+        for count in counts:
+            by, alone, at_once, same = names[:count], np.full((2, FEW), np.inf), np.inf, True
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SimulationWarning)
+                many = module.simulate_batch(q, u, t=(0, 2), sensitivities=by)
+                for _ in range(ROUNDS):
+                    begun = clock.process_time()
+                    module.simulate_batch(q, u, t=(0, 2), sensitivities=by)
+                    at_once = min(at_once, clock.process_time() - begun)
+                    for k in range(FEW):
+                        begun = clock.process_time()
+                        one = module.simulate(span, q[k], u[k], sensitivities=by)
+                        seconds = (one.integrator_seconds or np.inf, clock.process_time() - begun)
+                        alone[:, k] = np.minimum(alone[:, k], seconds)
+                        same &= bool((one.sensitivity.matrix[-1] == many.sensitivity.matrix[k, -1]).all())
+            label, among = f"{name} by {count}", at_once / SINGLE
+            inside, outer = alone.mean(axis=1)
+            yield f"{label}: a motion among {SINGLE}", among * 1e6, "us", ""
+            yield f"{label}: than the integrator of one, these are quicker by", inside / among, "x", ">= 1"
+            yield f"{label}: than simulate() in a loop by", outer / among, "x", ""
+            yield f"{label}: the bits of one motion", float(same), "", ">= 1"
+
+
+GROUPS = (chain, pendulums, loops, sensitivities)
 
 
 def run(only: Sequence[str] | None = None) -> int:

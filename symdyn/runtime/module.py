@@ -835,8 +835,7 @@ class Module:
         t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
         rtol, atol, max_step, first_step   as for `simulate`
         method, max_steps, stabilization, events, event_spacing   as for `simulate`, too
-        sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions, which run one by one then; see
-                    `BatchSolution.sensitivity`
+        sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions; see `BatchSolution.sensitivity`
 
         device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
                     mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits
@@ -847,7 +846,8 @@ class Module:
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, projections onto constraints, events with resets and inputs by tables included, by `dop853` or `bs54`,
         and a lane that is through goes on with the next motion. Mechanisms with rigid contacts, inputs by functions, implicit
-        methods, other options, and the NumPy backend run one by one through `simulate`; `note` of the solution documents it.
+        methods, other options, sensitivities across events that reset states or of right-hand sides that may jump, and the NumPy
+        backend run one by one through `simulate`; `note` of the solution documents it.
 
         A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions

@@ -48,7 +48,7 @@ def test_a_batch_has_the_bits_of_single_motions() -> None:
         assert np.array_equal(whole.sensitivity.matrix[k], one.sensitivity.matrix) and np.array_equal(whole.x[k], one.x)
         last = arm().simulate(T, {"q1": q1}, params={"l1": l1, "m2": m2}, sensitivities=BY, rtol=1e-9)
         assert np.array_equal(ends.sensitivity.matrix[k, 0], last.sensitivity.matrix[-1])
-    assert np.array_equal(whole.sensitivity.of("q2"), whole.sensitivity.matrix[:, :, 1]) and "with sensitivities" in repr(whole)
+    assert np.array_equal(whole.sensitivity.of("q2"), whole.sensitivity.matrix[:, :, 1])
     assert list(whole.sensitivity) == BY and len(whole.sensitivity) == 3 and sd.parameters("m2") in whole.sensitivity
     assert repr(whole.sensitivity) == "<Sensitivity of 5 motions, 4 states at 7 times, by l1, m2, q1(0)>"
     assert np.array_equal(pickle.loads(pickle.dumps(whole)).sensitivity["l1"], whole.sensitivity["l1"])

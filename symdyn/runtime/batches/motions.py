@@ -13,10 +13,12 @@ import numpy as np
 
 from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
-from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
+from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
+from symdyn.kinds import flag
 from symdyn.runtime.batches.arguments import take_rows, together
 from symdyn.runtime.batches.on_device import on_device
 from symdyn.runtime.batches.precision import checked_precision
+from symdyn.runtime.batches.sensitivities import Columns
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
 from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states import LIBRARY, input_rows, parameter_rows, tables_of, width
@@ -28,7 +30,6 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.events import wanted
-from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.integrating.simulate import (
     checked_method,
     checked_positive,
@@ -47,6 +48,10 @@ PIECE = 5_000
 PATIENCE = 4
 # The methods of motions that are integrated at once: those that are explicit.
 IN_LANES = tuple(name for name, method in METHODS.items() if method.tableau is not None)
+# Up to so many states and sensitivities a motion takes less time among others than with its own columns in the lanes, if only a
+# little where these fill them; above, what the stages of all lanes hold does not fit next to the processor. Measured with 8 lanes
+# and 1 MiB for each core.
+MOST_ENTRIES = 3500
 NO_VECTORS = "the C compiler has no vectors"
 
 
@@ -63,10 +68,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     checked_method(module, method)
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
-    faults: list[str] = []
-    by = tuple(names_of(module, sensitivities, faults)) if sensitivities is not None else ()
-    if faults:
-        raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
+    controlled = flag(sensitivity_control, f"{module.name}: sensitivity_control")
     initial = metadata.initial
     groups = [take_rows(values, metadata.names(what), f"initial {what}", metadata.initial_values(what), module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
@@ -76,22 +78,25 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
     n = together(rows, module.name)
     times, span = _times(module, t)
+    along = take_inputs(inputs, metadata.inputs, initial, module.name, span, interpolation, extend,
+                        metadata.motions) if by_time else None
+    columns = None if sensitivities is None else Columns.of(module, sensitivities, rows["params"], fixed, along, controlled)
+    columns = columns if columns is not None and columns.n else None
+    n_columns = 0 if columns is None else columns.n
     # The states that are kept, and starts, parameters, inputs and the report of each motion.
-    demand(n * (len(times) * metadata.sizes.x * (1 + len(by)) + metadata.sizes.x + 12), module.name,
+    demand(n * (len(times) * metadata.sizes.x * (1 + 2 * n_columns) + metadata.sizes.x + 12), module.name,
            f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
     starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
-    along = take_inputs(inputs, metadata.inputs, initial, module.name, span, interpolation, extend,
-                        metadata.motions) if by_time else None
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"), along,
-                   wanted(module, events), checked_spacing(module, event_spacing, span))
-    note = why_one_by_one(module) or _why_these(along, options) or ("one by one: with sensitivities" if by else "")
-    if by:
-        options |= {"sensitivities": by, "sensitivity_control": sensitivity_control}
+                   wanted(module, events), checked_spacing(module, event_spacing, span), columns)
+    note = why_one_by_one(module) or _why_these(along, options) or _why_columns(module, asked)
+    if columns is not None:
+        options |= {"sensitivities": columns.given, "sensitivity_control": controlled}
     over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
     varying = inputs if by_time else None
     given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
@@ -100,7 +105,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         solution = _one_by_one(module, asked, varying, given, note, options | rest)
     else:
         def alone(which: np.ndarray) -> BatchSolution:
-            return _alone(module, asked, which, varying, {k: v for k, v in options.items() if k == "method"} | rest)
+            kept = ("method", "sensitivities", "sensitivity_control")
+            return _alone(module, asked, which, varying, {k: v for k, v in options.items() if k in kept} | rest)
 
         method_or_default = options.get("method", METHOD)
         solution = _on_vectors(module, asked, method_or_default, alone) if gpu is None else on_device(
@@ -156,30 +162,45 @@ def _why_these(along: Inputs | None, options: Mapping[str, Any]) -> str:
     return f"one by one: asked for with {', '.join(others)}" if others else ""
 
 
+def _why_columns(module: Module, asked: Asked) -> str:
+    """Why motions with sensitivities are not integrated several at once."""
+    metadata, columns = module.metadata, asked.columns
+    if columns is None:
+        return ""
+    # How a run of its own warns of sensitivities needs its steps there, or its events.
+    if metadata.switches:
+        return "one by one: with sensitivities, of a right-hand side that may jump"
+    if any(event.reset for event, sought in zip(metadata.events, asked.look, strict=True) if sought):
+        return "one by one: with sensitivities, across events that reset states"
+    entries = metadata.sizes.x * (1 + columns.n)
+    return f"one by one: with {entries} sensitivities and states each, whose columns fill lanes" if entries > MOST_ENTRIES else ""
+
+
 # -- on vectors
 
 
-def unit_of(method: str, looks: bool) -> str | RightSide:
+def unit_of(method: str, looks: bool, sensitivities: tuple[str, ...] = ()) -> str | RightSide:
     """What the code of motions in lanes is made for; looks: for events."""
-    return LIBRARY if method == METHOD and not looks else RightSide(method=method, lanes=True, looks=looks)
+    plain = method == METHOD and not looks and not sensitivities
+    return LIBRARY if plain else RightSide(method=method, lanes=True, looks=looks, sensitivities=sensitivities)
 
 
 def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
-    library: Any = module.library(unit_of(method, asked.looks))
+    library: Any = module.library(unit_of(method, asked.looks, () if asked.columns is None else asked.columns.asked.columns))
     together = Together(module, asked)
     n = asked.n
     size = library.function("batch_size")
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
-    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, asked.atol, asked.times)])
+    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, together.atol, asked.times)])
     out = (ctypes.c_void_p * 2)(together.x.ctypes.data, together.states.ctypes.data)
     pieces, stops = together.pieces, together.stops
     problem = Problem(n_stops=len(stops), stops=stops.ctypes.data)
     if pieces is not None:
         breaks, coefficients = (np.ascontiguousarray(a) for a in (pieces.breaks, pieces.coefficients))
         problem.n_pieces, problem.breaks, problem.pieces = len(coefficients), breaks.ctypes.data, coefficients.ctypes.data
-    tables = tables_of([together.starts, asked.inputs, together.params, together.lengths])
+    tables = tables_of([together.starts, asked.inputs, together.params, together.lengths, together.atol])
     go = library.function("batch_go")
     go.restype = ctypes.c_long
     interrupted, done, waited = False, 0, 0
@@ -203,7 +224,7 @@ def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.n
 
 def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any, options: Mapping[str, Any]) -> BatchSolution:
     """Some motions one by one: a run of its own finds out whether a motion chatters and what led it off its constraints."""
-    part = replace(asked, n=len(which), **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
+    part = replace(asked, n=len(which), columns=None, **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
                                            for name in ("starts", "params", "inputs")})
     return _one_by_one(module, part, inputs, part.inputs, "", options, which, asked.n)
 
@@ -225,7 +246,7 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
     times = asked.times if len(asked.times) > 1 else np.array(asked.span)
     begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
-    by = options.get("sensitivities", ())
+    by = tuple(options.get("sensitivities", ()))
     columns = np.full((*x.shape, len(by)), np.nan)
     nowhere_columns = np.full((n_x, len(by)), np.nan)
 

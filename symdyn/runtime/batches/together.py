@@ -12,12 +12,14 @@ import numpy as np
 
 from symdyn.backend.c_records import codes_of
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
-from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.batches.sensitivities import Columns, doubtful, held, without_effect
+from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
 from symdyn.runtime.batches.starts import consistent_starts, projects
 from symdyn.runtime.integrating.chatter import STEPS
 from symdyn.runtime.integrating.compiled import FAR, PIECE, moved_far
 from symdyn.runtime.integrating.events import not_seen
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.sensitivities import zeros
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.masses import negative_masses
 
@@ -35,6 +37,7 @@ class Asked:
 
     along          inputs over time, the same for all; None: there are none
     look           which events are looked for, (n_e,) of bool; event_spacing: of samples of them, s
+    columns        of sensitivities; None: there are none
     """
 
     n: int
@@ -50,6 +53,7 @@ class Asked:
     along: Inputs | None
     look: np.ndarray
     event_spacing: float
+    columns: Columns | None = None
 
     @property
     def looks(self) -> bool:
@@ -60,12 +64,14 @@ class Asked:
 class Together:
     """Motions that are integrated together by compiled code, with its results.
 
-    x (n, n_t, n_x), reports (n,), states (n, 2, n_x), doubts (n,)    what the code writes
-    starts, params, lengths   what it reads; not a number where a motion cannot begin, for which `wrong` has the reason
+    x (n, n_t, n_x), reports (n,), states (n, 2, n_x), doubts (n,)    what the code writes; columns of sensitivities stand behind
+                              every state
+    starts, params, lengths, atol   what it reads; not a number where a motion cannot begin, for which `wrong` has the reason
+    alone                     which motions are integrated alone in any case, (n,) of bool
     """
 
     def __init__(self, module: Module, asked: Asked) -> None:
-        n, n_x = asked.n, module.metadata.sizes.x
+        n, n_x = asked.n, module.metadata.sizes.x * (1 if asked.columns is None else 1 + asked.columns.n)
         self.module, self.asked = module, asked
         self.x = np.full((n, len(asked.times), n_x), np.nan)
         self.reports = np.zeros(n, dtype=np.dtype(RunReport))
@@ -76,11 +82,17 @@ class Together:
         self.pieces = None if along is None else along.pieces
         self.stops = np.zeros(0) if along is None else np.sort(along.stops(asked.span))
         self.look = np.ascontiguousarray(asked.look if asked.looks else np.zeros(0), dtype=np.intc)
-        self.span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
+        rtol, self.atol = (asked.rtol, asked.atol[None, :]) if asked.columns is None else asked.columns.tolerances(
+            asked.rtol, asked.atol)
+        self.span = np.array([*asked.span, rtol, asked.first_step, asked.max_step])
         self.params, self.wrong = _real(module, asked)
         first = asked.inputs if self.pieces is None else self.pieces.at(np.array(asked.span[:1]))
         self.starts, self.lengths, astray = consistent_starts(module, asked.span[0], asked.starts, self.params, first, n)
         self.wrong |= astray
+        self.alone = np.zeros(n, dtype=bool)
+        if asked.columns is not None:
+            self.alone |= held(module, asked.span[0], self.starts, self.params, asked.columns)
+            self.starts = asked.columns.behind(self.starts)
         self.begun = clock.perf_counter()
 
     @property
@@ -94,7 +106,8 @@ class Together:
 
         Raises SimulationInterrupted where that was interrupted.
         """
-        module, reports, x, n = self.module, self.reports, self.x, self.asked.n
+        module, reports, n, columns = self.module, self.reports, self.asked.n, self.asked.columns
+        x = self.x if columns is None else np.ascontiguousarray(self.x[..., :module.metadata.sizes.x])
         success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
         late = reports["status"] == STATUS.STEP_LIMIT
         messages = {k: self.wrong.get(k) or _message(library, reports[k], self.states[k])
@@ -112,25 +125,61 @@ class Together:
             note = f"{doubtful.sum()} of {n} motions one by one: quantities of their events vary too quickly to be resolved"
         late |= doubtful
         # What keeps a state from the constraints, or fails at an event, a run of its own finds out.
-        if projects(module) or self.asked.looks:
+        if projects(module) or self.asked.looks or columns is not None:
             late |= ~success
-            late[list(self.wrong)] = False
+        if columns is not None:
+            rows = self._rows()
+            nothing, closer = without_effect(columns, rows), self.alone | self._doubtful(columns, rows)
+            if self.x.shape[1] == 1 and projects(module):  # projection may have made something of a start
+                closer |= nothing.any(axis=1)
+            closer[list(self.wrong)] = False
+            if closer.any() and not interrupted:
+                note = (f"{closer.sum()} of {n} motions one by one: in them a parameter may cancel, a state may stay at a kink, "
+                        "or constraints may not let a parameter change")
+            late |= closer
+            warn([f"{k}: {zeros(module, [name for name, zero in zip(columns.asked.names, nothing[k]) if zero])}"
+                  for k in np.flatnonzero(nothing.any(axis=1) & success & ~late).tolist()], n)
+        late[list(self.wrong)] = False
         unseen = not_seen(module, self.asked.look, (), self.asked.event_spacing)
         warn([f"{k}: {unseen}" for k in np.flatnonzero(~late).tolist() if unseen], n)
         moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
-        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k])}" for k in moved.tolist()], n)
+        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k], columns is not None)}"
+              for k in moved.tolist() if not late[k]], n)
+        matrix = None if columns is None else np.ascontiguousarray(np.swapaxes(
+            self.x[..., module.metadata.sizes.x:].reshape(*x.shape[:2], columns.n, x.shape[2]), 2, 3))
         if late.any() and not interrupted:
             again = np.flatnonzero(late)
             single = alone(again)
             x[again], success[again] = single.x, single.success
+            if matrix is not None:
+                matrix[again] = single.sensitivity.matrix
             counts[again] = np.column_stack([single.n_steps, single.n_rejected])
             messages = {k: message for k, message in messages.items() if not late[k]}
             messages |= {int(again[k]): message for k, message in single.messages.items()}
         solution = BatchSolution(module.metadata, self.asked.times, x, success, dict(sorted(messages.items())), counts[:, 0],
-                                 counts[:, 1], width, note, clock.perf_counter() - self.begun)
+                                 counts[:, 1], width, note, clock.perf_counter() - self.begun,
+                                 None if columns is None or matrix is None else BatchSensitivity(
+                                     module.metadata, columns.asked.names, matrix))
         if interrupted:
             raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
         return solution
+
+
+    def _rows(self) -> np.ndarray:
+        """What is known of every motion, (n, n_t, n_x): where only its end is kept, the start, too."""
+        if self.x.shape[1] > 1:
+            return self.x
+        starts = np.broadcast_to(self.starts, (self.asked.n, self.starts.shape[1]))
+        return np.stack([starts, self.states[:, 0]], axis=1)
+
+    def _doubtful(self, columns: Columns, rows: np.ndarray) -> np.ndarray:
+        """Which motions a run of its own may warn of, (n,) of bool."""
+        n, n_x, begin = self.asked.n, self.module.metadata.sizes.x, self.asked.span[0]
+        starts = np.broadcast_to(self.starts[:, :n_x], (n, n_x))
+        t = np.column_stack([np.full(n, begin), self.reports["t"]])
+        x = np.stack([starts, self.states[:, 0, :n_x]], axis=1)
+        inputs = self.asked.inputs[:, None, :] if self.pieces is None else self.pieces.at(t.ravel()).reshape(n, 2, -1)
+        return doubtful(self.module, columns, rows, (t, x, np.broadcast_to(inputs, (n, 2, inputs.shape[2]))), self.params)
 
 
 def _real(module: Module, asked: Asked) -> tuple[np.ndarray, dict[int, str]]:

@@ -64,8 +64,7 @@ class Asked:
                    for record in metadata.contacts for name in by if name in record.parameters]
         if faults:
             raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
-        values = {**dict(zip(metadata.inputs, inputs.constant, strict=True)), **dict(zip(metadata.parameters, p, strict=True))}
-        columns, starts, sizes = [], [], []
+        columns, starts = [], []
         along = _given_starts(module, given)
         for name, state in by.items():
             start = np.zeros(n_x)
@@ -74,10 +73,10 @@ class Asked:
             elif state:
                 start[metadata.x.index(state)] = 1.0
             columns.append("" if state else name)
-            sizes.append(1.0 if state else abs(float(values[name])) or 1.0)
             starts.append(start)
         names = list(by)
-        return cls(tuple(names), tuple(columns), np.array(starts).reshape(len(names), n_x), np.array(sizes))
+        sizes = sizes_of(module, columns, np.concatenate([inputs.constant, p]))
+        return cls(tuple(names), tuple(columns), np.array(starts).reshape(len(names), n_x), sizes)
 
     def added_to(self, request: Request, controlled: bool, inputs: Sequence[str]) -> Request:
         """The request with the columns behind the state; inputs: names.
@@ -85,13 +84,11 @@ class Asked:
         Tolerances are such that the error of the state, and of every column if they are controlled, is within what was asked for
         in its own root mean square: they count in that of all entries.
         """
-        part = 1.0 / np.sqrt(1.0 + len(self.columns))
-        of_columns = part * request.atol / self.sizes[:, None] if controlled else np.full(self.starts.shape, _ANY)
+        rtol, atol = tolerances(request.rtol, request.atol, self.sizes, controlled)
         names = [name for k, name in enumerate(inputs) if k in request.inputs.places] if request.inputs.are_held else []
         followed = [inputs[index] for places, *_ in request.inputs.gradients for index in places]
-        return replace(request, held=tuple(names), followed=tuple(followed), rtol=part * request.rtol,
-                       x0=np.concatenate([request.x0, self.starts.ravel()]),
-                       atol=np.concatenate([part * request.atol, of_columns.ravel()]), columns=self.columns)
+        return replace(request, held=tuple(names), followed=tuple(followed), rtol=rtol,
+                       x0=np.concatenate([request.x0, self.starts.ravel()]), atol=atol, columns=self.columns)
 
     def check(self, module: Module, request: Request, method: Any, work: bool) -> None:
         """Raises ArgumentError where a run cannot have sensitivities."""
@@ -143,7 +140,7 @@ class Asked:
                   f"system.add_event(name, {surface})" for name, surface in moved.items()]
         nothing = [name for name in nothing if name not in moved]
         if nothing:
-            result.append(f"{but} {', '.join(nothing)}: the sensitivities are zero")
+            result.append(zeros(module, nothing))
         cancel = self._cancelling(module, request, outcome, columns[0], known, [*nothing, *moved])
         if cancel:
             result.append(f"{but} {', '.join(cancel)}, which cancel{'s' if len(cancel) == 1 else ''} in its equations: the "
@@ -166,6 +163,30 @@ class Asked:
             return []
         run = steps()
         return unaffected(module, request, asked, run.t, run.x[:, :n_x])
+
+
+def zeros(module: Module, names: Sequence[str]) -> str:
+    """What to warn of where a motion does not depend on these."""
+    return f"{module.name}: nothing in this motion depends on {', '.join(names)}: the sensitivities are zero"
+
+
+def sizes_of(module: Module, columns: Sequence[str], values: np.ndarray) -> np.ndarray:
+    """Sizes of what columns are by, (..., n_columns), from the values of inputs and parameters, (..., n_in + n_p)."""
+    known = [*module.metadata.inputs, *module.metadata.parameters]
+    result = np.ones((*values.shape[:-1], len(columns)))
+    for k, name in enumerate(columns):
+        if name:
+            result[..., k] = np.abs(values[..., known.index(name)])
+    result[result == 0] = 1.0
+    return result
+
+
+def tolerances(rtol: float, atol: np.ndarray, sizes: np.ndarray, controlled: bool) -> tuple[float, np.ndarray]:
+    """Relative and absolute tolerances, (..., n_x (1 + n_columns)), of a state with its columns; sizes: (..., n_columns)."""
+    part = 1.0 / np.sqrt(1.0 + sizes.shape[-1])
+    of_columns = part * atol / sizes[..., None] if controlled else np.full((*sizes.shape, len(atol)), _ANY)
+    of_state = np.broadcast_to(part * atol, (*sizes.shape[:-1], len(atol)))
+    return part * rtol, np.concatenate([of_state, of_columns.reshape(*sizes.shape[:-1], -1)], axis=-1)
 
 
 def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Sequence[str]) -> dict[str, str]:

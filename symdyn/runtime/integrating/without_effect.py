@@ -32,15 +32,14 @@ def unaffected(module: Module, request: Request, names: Sequence[str], t: np.nda
     """
     metadata = module.metadata
     inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), metadata.sizes.inputs))
-    groups = (metadata.sizes.q, metadata.sizes.u, metadata.sizes.x - metadata.sizes.q - metadata.sizes.u)
-    functions: list[tuple[str, tuple[int, ...]]] = [("rhs", groups)]
+    functions: list[tuple[str, tuple[int, ...]]] = [("rhs", groups_of(module))]
     if request.look is not None and request.look.any():
         functions += [(name, ()) for name in (EVENTS, RESETS) if name in metadata.functions]
 
     def stays(name: str) -> bool:
         for function, groups in functions:
             here = module.evaluate(function, t, x, request.p, inputs)
-            size = ROUNDING * _sizes(here, groups)
+            size = ROUNDING * sizes(here, groups)
             for other in (lambda value: 1.5 * value, lambda value: value + 1.0):
                 p, given = request.p.copy(), inputs.copy()
                 if name in metadata.parameters:
@@ -62,9 +61,19 @@ def unaffected(module: Module, request: Request, names: Sequence[str], t: np.nda
     return result
 
 
-def _sizes(values: np.ndarray, groups: Sequence[int]) -> np.ndarray:
-    """The largest values of every column, of what is nothing but rounding those of its group; groups: numbers of columns."""
-    own = np.abs(values).max(axis=0)
-    parts = np.split(own, np.cumsum(groups)[:-1]) if groups else [own[k:k + 1] for k in range(len(own))]
-    largest = np.concatenate([np.full(len(part), part.max(initial=0.0)) for part in parts])
+def groups_of(module: Module) -> tuple[int, int, int]:
+    """Numbers of coordinates, speeds and extra states."""
+    sizes = module.metadata.sizes
+    return sizes.q, sizes.u, sizes.x - sizes.q - sizes.u
+
+
+def sizes(values: np.ndarray, groups: Sequence[int]) -> np.ndarray:
+    """The largest values of every column, of what is nothing but rounding those of its group; groups: numbers of columns.
+
+    values   (..., n_rows, n_columns)
+    """
+    own = np.abs(values).max(axis=-2)
+    parts = np.split(own, np.cumsum(groups)[:-1] if groups else own.shape[-1], axis=-1)
+    largest = np.concatenate([np.broadcast_to(part.max(axis=-1, keepdims=True, initial=0.0), part.shape) for part in parts],
+                             axis=-1)
     return np.where(own > NOTHING * largest, own, largest)

@@ -32,6 +32,9 @@ typedef struct {
     double *x_out, *states;
     symdyn_report *report;
     long n, n_out, next, n_done;
+#if SYMDYN_SENSITIVE
+    symdyn_vector tolerated[SYMDYN_NX];  // the absolute tolerances of each lane
+#endif
 #if SYMDYN_HAS_INPUTS
     symdyn_problem over_time;  // inputs that are the same for all, if they have pieces
 #endif
@@ -92,7 +95,14 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
         problem.length = batch->given[3].at[i * batch->given[3].row];
 #endif
         for (int k = 0; k < SYMDYN_NX; k++) x0[k] = batch->given->at[i * batch->given->row + k * batch->given->entry];
-        SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, batch->atol);
+#if SYMDYN_SENSITIVE
+        double atol[SYMDYN_NX];
+        for (int k = 0; k < SYMDYN_NX; k++)
+            atol[k] = LANE(batch->tolerated[k], l) = batch->given[4].at[i * batch->given[4].row + k * batch->given[4].entry];
+#else
+        const double *const atol = batch->atol;
+#endif
+        SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, atol);
         if (code) {
             run->status = SYMDYN_NO_CONSTANTS;
             run->reason = code;
@@ -180,7 +190,11 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
 #endif
         for (int l = 0; l < SYMDYN_WIDTH; l++)
             LANE(size, l) = fabs(LANE(x[i], l)) > fabs(LANE(y[i], l)) ? fabs(LANE(x[i], l)) : fabs(LANE(y[i], l));
+#if SYMDYN_SENSITIVE
+        scale = 1.0 / (batch->tolerated[i] + batch->span[2] * size + 1e-300);
+#else
         scale = 1.0 / (batch->atol[i] + batch->span[2] * size + 1e-300);
+#endif
         sum += (e * scale) * (e * scale);
 #if SYMDYN_SECOND_ERROR
         sum2 += (e2 * scale) * (e2 * scale);
@@ -286,7 +300,8 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double
 #endif
 
 // given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP), with constraints the lengths that residuals are
-// measured by (1); counts: trajectories, output times; real: span (t0, t_end, rtol, first step, largest step), atol (SYMDYN_NX),
+// measured by (1), with sensitivities, behind these lengths or what stands in their place, absolute tolerances (SYMDYN_NX), which
+// replace atol; counts: trajectories, output times; real: span (t0, t_end, rtol, first step, largest step), atol (SYMDYN_NX),
 // output times; out: states at these (SYMDYN_NX each), states of the reports (2 SYMDYN_NX each); reports: one each. All have to
 // stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
