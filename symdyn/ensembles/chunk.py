@@ -17,7 +17,7 @@ from symdyn.backend.right_side import METHOD
 from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
-from symdyn.runtime.batches.motions import IN_LANES, why_one_by_one
+from symdyn.runtime.batches.motions import IN_LANES, why_columns_one_by_one, why_one_by_one
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.outcome import Outcome
@@ -138,9 +138,7 @@ def _one_by_one(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
 def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Done) -> None:
     """Simulate samples, by their places, several at once."""
     module: Module = setting.system.module
-    states, times = list(module.metadata.x), setting.times
-    numbers = NUMBERS if setting.device == "cpu" else NUMBERS_OF_DEVICE
-    at_once = max(1, numbers // (len(times) * len(states)))
+    states, times, at_once = list(module.metadata.x), setting.times, held_at_once(setting)
     for part in (rows[k:k + at_once] for k in range(0, len(rows), at_once)):
         groups = _groups(setting, values[part])
         try:
@@ -154,8 +152,17 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
             done.fail(int(part[place]), MemberFailed(message))
         well = np.flatnonzero(batch.success)
         others = [m for m in setting.measures if m.name not in states]
+        if any(measure.grad for measure in setting.measures):
+            doubtful = [place for place in sorted(batch.doubts) if batch.success[place]]
+            done.n_doubtful += len(doubtful)
+            left = LISTED - len(done.doubts)
+            done.doubts += [(int(part[place]), batch.doubts[place][0]) for place in doubtful[:left]]
         for measure in setting.measures:
-            if measure.name in states:
+            if measure.grad:  # one after the other: sums are rounded as those of a motion alone
+                for place in well.tolist():
+                    done.columns[measure.label][part[place]] = measure.of_rows(
+                        times, batch[measure.name][place], batch.sensitivity.of(measure.name)[place])
+            elif measure.name in states:
                 over_time = batch.x[well, :, states.index(measure.name)].T
                 done.columns[measure.label][part[well]] = measure.reduce(times, over_time).T
         for place in well.tolist() if others else ():
@@ -177,11 +184,25 @@ def _raise_others(error: Exception) -> None:
         raise error
 
 
+def numbers_of(setting: Setting) -> int:
+    """How many numbers a motion has."""
+    n_columns = len(setting.options.get("sensitivities", ()))
+    return len(setting.times) * max(1, len(setting.system.module.metadata.x)) * (1 + 2 * n_columns)
+
+
+def held_at_once(setting: Setting) -> int:
+    """How many motions are held at a time where several are integrated at once."""
+    return max(1, (NUMBERS if setting.device == "cpu" else NUMBERS_OF_DEVICE) // numbers_of(setting))
+
+
 def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any], measures: Sequence[Measure]) -> bool:
     """Whether motions can be integrated several at once, with the very steps of `simulate`."""
+    n, look = len(options.get("sensitivities", ())), wanted(module, options.get("events", True))
     return (not (why_one_by_one(module) or consistent) and events_serve(module, options, measures)
-            and options.get("method", METHOD) in IN_LANES
-            and set(options) <= {"rtol", "atol", "max_step", "first_step", "method", "events", "event_spacing"})
+            and options.get("method", METHOD) in IN_LANES and not why_columns_one_by_one(module, look, n)
+            and not (n and any(m.name not in module.metadata.x for m in measures))
+            and set(options) <= {"rtol", "atol", "max_step", "first_step", "method", "events", "event_spacing", "sensitivities",
+                                 "sensitivity_control"})
 
 
 def events_serve(module: Module, options: Mapping[str, Any], measures: Sequence[Measure]) -> bool:

@@ -80,10 +80,13 @@ class Measure:
         values = values_of(solution, self.name)
         if not self.grad:
             return self.reduce(solution.t, values)
-        derivatives = solution.sensitivity.of(self.name)
+        return self.of_rows(solution.t, values, solution.sensitivity.of(self.name))
+
+    def of_rows(self, t: np.ndarray, values: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
+        """Its derivatives from values over time, (n_t, ...), and their derivatives, (n_t, ..., n)."""
         if self.kind == "at":
-            return self.reduce(solution.t, derivatives)
-        return np.asarray(GRADIENTS[self.kind](solution.t, values, derivatives))
+            return self.reduce(t, derivatives)
+        return np.asarray(GRADIENTS[self.kind](t, values, derivatives))
 
     def reduce(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Its value from those over time, (n_t, ...)."""

@@ -18,6 +18,7 @@ from symdyn.errors import ArgumentError, CompileError, CompilerNotFound
 from symdyn.kinds import flag
 from symdyn.runtime.batches.motions import unit_of
 from symdyn.runtime.batches.on_device import demand_fit
+from symdyn.runtime.batches.states import LIBRARY
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.integrating.events import wanted
@@ -134,8 +135,10 @@ def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: A
         _check_device(module, gpu, options, consistent, measures)
     vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options, measures))
     method, looks = str(options.get("method", METHOD)), bool(wanted(module, options.get("events", True)).any())
-    lanes = unit_of(method, looks) if gpu is None else RightSide(method=method, threads=True, looks=looks)
-    together = [lanes] if vectors else []
+    by = names_of(module, options.get("sensitivities", ()), [])
+    lanes = unit_of(method, looks, tuple("" if state else name for name, state in by.items())) if gpu is None else RightSide(
+        method=method, threads=True, looks=looks)
+    together = [lanes, *[LIBRARY] * (gpu is None)] if vectors else []
     portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions, *together])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
     if varies_over_time(inputs):

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from symdyn.counting import counted
-from symdyn.ensembles.chunk import NUMBERS, NUMBERS_OF_DEVICE, Chunk, Done, quiet, run_chunk
+from symdyn.ensembles.chunk import Chunk, Done, held_at_once, numbers_of, quiet, run_chunk
 from symdyn.ensembles.cluster import Cluster, in_time
 from symdyn.ensembles.exports import EXPORTS
 from symdyn.ensembles.plan import Plan
@@ -330,9 +330,8 @@ def _disk(plan: Plan, folder: Path, formats: tuple[str, ...]) -> tuple[tuple[flo
 def _memory(plan: Plan, measured: Measured, size: int, cores: int) -> int:
     """Bytes of a worker: what it had before, and for each core a chunk, its outcomes, and the motions that are held at once."""
     setting = plan.setting
-    numbers = len(setting.times) * max(1, len(setting.system.module.metadata.x))
-    held = min(size, max(1, (NUMBERS if setting.device == "cpu" else NUMBERS_OF_DEVICE) // numbers)) if setting.vectors else 1
-    return measured.memory + 8 * cores * (held * numbers + size * (plan.outcome_numbers + len(plan.samples.names)))
+    held = min(size, held_at_once(setting)) if setting.vectors else 1
+    return measured.memory + 8 * cores * (held * numbers_of(setting) + size * (plan.outcome_numbers + len(plan.samples.names)))
 
 
 def _there(folder: Path) -> Path:

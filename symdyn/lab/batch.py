@@ -175,8 +175,8 @@ def loops() -> Iterator[Figure]:
 
 
 def sensitivities() -> Iterator[Figure]:
-    """Motions with derivatives by few and by many numbers: a motion in each lane, and one after the other, with several columns of
-    one motion in the lanes where these are many. Times of the processor."""
+    """Motions with derivatives by few and by many numbers: a motion in each lane, and one after the other, where columns fill the
+    lanes. Times of the processor."""
     for name, sizes, counts in DIFFERENTIATED:
         module = sd.systems.get(name, **sizes).compile(backend="c")
         rng, n_q, n_u = np.random.default_rng(6), module.metadata.sizes.q, module.metadata.sizes.u

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +15,12 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.ensembles import chunk, plan
+from symdyn.ensembles.measures import take_measures
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.batches import motions
 from symdyn.runtime.batches.motions import unit_of
+from symdyn.runtime.module import Module
 from tests.derivatives.test_sensitivities import common, free_body, three_cranks
 
 pytestmark = pytest.mark.native  # tcc has no vectors
@@ -227,3 +233,56 @@ def test_what_does_not_fit(arm: Any) -> None:
     for text in ("by 'gg' was asked for", "by q1 was asked for, which is a state", "sensitivities name m2 twice"):
         assert text in str(found.value)
     assert arm.simulate_batch(**GROUPS, t=(0, 0.1), sensitivities=[]).columns is None
+
+
+OUTCOMES = ["end q1", "grad end q1", "grad q2_dot at 0.5", "grad mean q2", "grad rms q1", "grad max q2_dot", "grad start q1",
+            "grad trace q1"]
+
+
+def test_ensembles_in_lanes_have_the_bits_of_single_motions(arm: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    samples = {"q1": np.linspace(-1, 1, N), "l1": np.linspace(0.5, 1.5, N)}
+    samples["q1"][7] = np.nan
+    times = np.linspace(0, 1, 5)
+    one = sd.ensemble(arm, samples, times, OUTCOMES, chunk=9, sensitivities=["l1", "q1(0)", "m2"])
+    monkeypatch.setattr(plan, "VECTORS_FROM", 1)
+    monkeypatch.setattr(chunk, "NUMBERS", 800)  # five motions at a time
+    called: list[int] = []
+    simulate = Module.simulate
+    monkeypatch.setattr(Module, "simulate", lambda self, *a, **k: called.append(1) or simulate(self, *a, **k))
+    several = sd.ensemble(arm, samples, times, OUTCOMES, chunk=9, sensitivities=["l1", "q1(0)", "m2"], path=tmp_path / "here")
+    assert len(called) == 1  # the sample that is tried first
+    assert [f["index"] for f in several.failures()] == [f["index"] for f in one.failures()] == [7]
+    for label in OUTCOMES:
+        assert np.array_equal(one[label], several[label], equal_nan=True), label
+    with ProcessPoolExecutor(1, get_context("spawn")) as processes:
+        there = sd.ensemble(arm, samples, times, OUTCOMES, chunk=9, sensitivities=["l1", "q1(0)", "m2"], path=tmp_path / "there",
+                            executor=processes)
+    assert there.file.read_bytes() == several.file.read_bytes()
+
+
+def test_ensembles_in_lanes_warn_as_those_of_single_motions(monkeypatch: pytest.MonkeyPatch) -> None:
+    module, samples = falling(), {"y": np.linspace(1, 2, 6)}
+    found = []
+    for first in (2000, 1):
+        monkeypatch.setattr(plan, "VECTORS_FROM", first)
+        with pytest.warns(SimulationWarning, match="nothing in this motion depends on m: the sensitivities are zero"):
+            found.append(sd.ensemble(module, samples, (0, 1), ["grad end y"], chunk=4, sensitivities=["g", "m"]))
+    assert found[0].doubts == found[1].doubts and "6 of 6 members" in found[0].doubts
+    assert np.array_equal(found[0]["grad end y"], found[1]["grad end y"])
+
+
+def test_which_ensembles_are_in_lanes(arm: Any) -> None:
+    measures = take_measures(["end q1", "grad end q1"], arm)
+    assert chunk.vectors_serve(arm, False, {"sensitivities": ("m2",)}, measures)
+    assert not chunk.vectors_serve(arm, False, {"sensitivities": ("m2",)}, take_measures(["grad end q1", "max energy"], arm))
+    bouncing, of_y = falling(reset=True), take_measures(["grad end y"], falling(reset=True))
+    assert not chunk.vectors_serve(bouncing, False, {"sensitivities": ("m",)}, of_y)
+    assert chunk.vectors_serve(bouncing, False, {"sensitivities": ("m",), "events": False}, of_y)
+
+
+def test_batches_keep_what_they_warned_of(arm: Any) -> None:
+    module = falling()
+    with pytest.warns(SimulationWarning):
+        many = module.simulate_batch({"y": [1.0, 2.0]}, params={"m": [1.0, 2.0]}, inputs={"F": [0.0, 1.0]}, t=(0, 1),
+                                     sensitivities=["m"])
+    assert many.doubts == {0: ["falling: nothing in this motion depends on m: the sensitivities are zero"]}

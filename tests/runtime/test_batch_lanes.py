@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.ensembles import plan
 from tests.helpers import swept
 
 pytestmark = pytest.mark.native  # tcc has no vectors
@@ -117,3 +120,13 @@ def test_ensembles_with_resets() -> None:
     many = sd.ensemble(module, drawn, (0, 1), ["end y", "max y"])
     few = [module.simulate((0, 1), q={"y": y}) for y in drawn.block(0, 4)[:, 0]]
     assert all(many["end y"][k] == s.x[-1, 0] and many["max y"][k] == s["y"].max() for k, s in enumerate(few))
+
+
+def test_ensembles_with_resets_in_other_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They get all that motions in lanes call, as text."""
+    monkeypatch.setattr(plan, "VECTORS_FROM", 1)
+    module, samples = bouncing(["floor"]), {"y": np.linspace(0.5, 2, N)}
+    here = sd.ensemble(module, samples, (0, 1), ["end y"])
+    with ProcessPoolExecutor(1, get_context("spawn")) as processes:
+        there = sd.ensemble(module, samples, (0, 1), ["end y"], executor=processes)
+    assert there.n_failed == 0 and np.array_equal(here["end y"], there["end y"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import time as clock
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +94,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"), along,
                    wanted(module, events), checked_spacing(module, event_spacing, span), columns)
-    note = why_one_by_one(module) or _why_these(along, options) or _why_columns(module, asked)
+    note = why_one_by_one(module) or _why_these(along, options) or why_columns_one_by_one(
+        module, asked.look, n_columns)
     if columns is not None:
         options |= {"sensitivities": columns.given, "sensitivity_control": controlled}
     over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
@@ -162,17 +163,18 @@ def _why_these(along: Inputs | None, options: Mapping[str, Any]) -> str:
     return f"one by one: asked for with {', '.join(others)}" if others else ""
 
 
-def _why_columns(module: Module, asked: Asked) -> str:
-    """Why motions with sensitivities are not integrated several at once."""
-    metadata, columns = module.metadata, asked.columns
-    if columns is None:
+def why_columns_one_by_one(module: Module, look: np.ndarray, n: int) -> str:
+    """Why motions with sensitivities in n columns are not integrated several at once; "" if they are. look: for which events,
+    (n_e,) of bool."""
+    metadata = module.metadata
+    if not n:
         return ""
     # How a run of its own warns of sensitivities needs its steps there, or its events.
     if metadata.switches:
         return "one by one: with sensitivities, of a right-hand side that may jump"
-    if any(event.reset for event, sought in zip(metadata.events, asked.look, strict=True) if sought):
+    if any(event.reset for event, sought in zip(metadata.events, look, strict=True) if sought):
         return "one by one: with sensitivities, across events that reset states"
-    entries = metadata.sizes.x * (1 + columns.n)
+    entries = metadata.sizes.x * (1 + n)
     return f"one by one: with {entries} sensitivities and states each, whose columns fill lanes" if entries > MOST_ENTRIES else ""
 
 
@@ -226,23 +228,23 @@ def _alone(module: Module, asked: Asked, which: np.ndarray, inputs: Any, options
     """Some motions one by one: a run of its own finds out whether a motion chatters and what led it off its constraints."""
     part = replace(asked, n=len(which), columns=None, **{name: rows[which] if len(rows := getattr(asked, name)) > 1 else rows
                                            for name in ("starts", "params", "inputs")})
-    return _one_by_one(module, part, inputs, part.inputs, "", options, which, asked.n)
+    return _one_by_one(module, part, inputs, part.inputs, "", options, which)
 
 
 # -- one by one
 
 
 def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, note: str, options: Mapping[str, Any],
-                which: np.ndarray | None = None, of: int = 0) -> BatchSolution:
+                which: np.ndarray | None = None) -> BatchSolution:
     """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary.
 
-    which, of   where these are some of more motions: their numbers there, how many there are
+    which       where these are some of more motions: their numbers there
     """
     n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
     x = np.full((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
     messages: dict[int, str] = {}
-    doubts: list[str] = []
+    doubts: dict[int, Sequence[str]] = {}
     times = asked.times if len(asked.times) > 1 else np.array(asked.span)
     begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
@@ -253,7 +255,7 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
     def solution() -> BatchSolution:
         sensitivity = BatchSensitivity(module.metadata, by, columns) if by else None
         return BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], 1, note,
-                             clock.perf_counter() - begun, sensitivity)
+                             clock.perf_counter() - begun, sensitivity, doubts)
 
     for k in range(n):
         start, p, given = (a[k if len(a) > 1 else 0] for a in (asked.starts, asked.params, asked.inputs))
@@ -272,7 +274,8 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
             messages[k] = str(error)
             continue
         success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
-        doubts += [f"{k if which is None else which[k]}: {doubt}" for doubt in done.doubts]
+        if done.doubts:
+            doubts[k] = done.doubts
         if len(asked.times) > 1:
             there = dict(zip(done.t.tolist(), done.x, strict=True))
             x[k] = [there.get(t, nowhere) for t in times.tolist()]
@@ -288,5 +291,6 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
             used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
         if not done.success:
             messages[k] = done.message
-    warn(doubts, of or n)
+    if which is None:
+        warn(doubts, n)
     return solution()

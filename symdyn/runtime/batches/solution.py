@@ -65,6 +65,7 @@ class BatchSolution:
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is
     seconds    what the integration took
     columns    derivatives, of runs that were asked for them, see `sensitivity`
+    doubts     what motions were warned of, by their number
 
     >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
     >>> motions.x.shape, motions.q.shape
@@ -82,6 +83,7 @@ class BatchSolution:
     note: str = ""
     seconds: float = field(default=0.0, compare=False)
     columns: BatchSensitivity | None = None
+    doubts: Mapping[int, Sequence[str]] = field(default_factory=dict)
 
     @property
     def sensitivity(self) -> BatchSensitivity:

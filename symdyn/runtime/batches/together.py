@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -110,6 +110,7 @@ class Together:
         x = self.x if columns is None else np.ascontiguousarray(self.x[..., :module.metadata.sizes.x])
         success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
         late = reports["status"] == STATUS.STEP_LIMIT
+        doubts: dict[int, list[str]] = {}
         messages = {k: self.wrong.get(k) or _message(library, reports[k], self.states[k])
                     for k in np.flatnonzero(~success).tolist()}
         if late.any() and not interrupted:
@@ -137,14 +138,17 @@ class Together:
                 note = (f"{closer.sum()} of {n} motions one by one: in them a parameter may cancel, a state may stay at a kink, "
                         "or constraints may not let a parameter change")
             late |= closer
-            warn([f"{k}: {zeros(module, [name for name, zero in zip(columns.asked.names, nothing[k]) if zero])}"
-                  for k in np.flatnonzero(nothing.any(axis=1) & success & ~late).tolist()], n)
+            for k in np.flatnonzero(nothing.any(axis=1) & success & ~late).tolist():
+                doubts.setdefault(k, []).append(zeros(module, [
+                    name for name, zero in zip(columns.asked.names, nothing[k], strict=True) if zero]))
         late[list(self.wrong)] = False
         unseen = not_seen(module, self.asked.look, (), self.asked.event_spacing)
-        warn([f"{k}: {unseen}" for k in np.flatnonzero(~late).tolist() if unseen], n)
+        for k in np.flatnonzero(~late).tolist() if unseen else ():
+            doubts.setdefault(k, []).append(unseen)
         moved = np.flatnonzero((reports["largest_moved"] > FAR) & success)
-        warn([f"{k}: {moved_far(module.name, reports['largest_moved'][k], reports['t_moved'][k], columns is not None)}"
-              for k in moved.tolist() if not late[k]], n)
+        for k in moved[~late[moved]].tolist():
+            far = moved_far(module.name, reports["largest_moved"][k], reports["t_moved"][k], columns is not None)
+            doubts.setdefault(k, []).append(far)
         matrix = None if columns is None else np.ascontiguousarray(np.swapaxes(
             self.x[..., module.metadata.sizes.x:].reshape(*x.shape[:2], columns.n, x.shape[2]), 2, 3))
         if late.any() and not interrupted:
@@ -156,10 +160,12 @@ class Together:
             counts[again] = np.column_stack([single.n_steps, single.n_rejected])
             messages = {k: message for k, message in messages.items() if not late[k]}
             messages |= {int(again[k]): message for k, message in single.messages.items()}
+            doubts |= {int(again[k]): list(texts) for k, texts in single.doubts.items()}
+        warn(doubts, n)
         solution = BatchSolution(module.metadata, self.asked.times, x, success, dict(sorted(messages.items())), counts[:, 0],
                                  counts[:, 1], width, note, clock.perf_counter() - self.begun,
                                  None if columns is None or matrix is None else BatchSensitivity(
-                                     module.metadata, columns.asked.names, matrix))
+                                     module.metadata, columns.asked.names, matrix), doubts)
         if interrupted:
             raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
         return solution
@@ -217,8 +223,9 @@ def _message(library: Any, row: np.ndarray, states: np.ndarray) -> str:
                          why.get(of.status, f"the integrator does not go on (status {of.status})"))
 
 
-def warn(doubts: Sequence[str], n: int) -> None:
-    """Warns of some of n motions, if there are any."""
-    if doubts:
-        more = f"; and {len(doubts) - LISTED} more" if len(doubts) > LISTED else ""
-        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=5)
+def warn(doubts: Mapping[int, Sequence[str]], n: int) -> None:
+    """Warns of some of n motions, if there are any; doubts: by their numbers."""
+    lines = [f"{k}: {text}" for k, texts in sorted(doubts.items()) for text in texts]
+    if lines:
+        more = f"; and {len(lines) - LISTED} more" if len(lines) > LISTED else ""
+        warnings.warn(f"of {n} motions {'; '.join(lines[:LISTED])}{more}", SimulationWarning, stacklevel=5)
