@@ -18,6 +18,8 @@ from symdyn.shown import shown
 DOUBLE = np.dtype(float)
 # Axes that values of any argument have at most, with one to spare.
 MOST_AXES = 4
+# Devices, by the protocol DLPack, whose memory is that of the process: the processor, memory that is pinned for CUDA or for ROCm.
+HERE = (None, 1, 3, 11)
 MASKED = "a masked array, whose hidden entries would count; pass .filled(...) or .compressed()"
 TRUTH = "True and False are no numbers; pass 1.0 and 0.0 if these are meant"
 
@@ -27,10 +29,10 @@ class NotReal(ValueError):
 
 
 def real(values: Any) -> np.ndarray:
-    """An array of doubles, the array itself if it is one; NaN and infinity pass.
+    """An array of doubles, the array itself if it is one, also of another library that follows DLPack; NaN and infinity pass.
 
-    Raises NotReal for complex numbers (also with imaginary part zero), masked entries, truth values, text, dates, numbers beyond
-    the range of doubles, rows of different lengths, and anything else that has no numbers.
+    Raises NotReal for arrays on devices, complex numbers (also with imaginary part zero), masked entries, truth values, text,
+    dates, numbers beyond the range of doubles, rows of different lengths, and anything else that has no numbers.
     """
     if type(values) is np.ndarray and values.dtype is DOUBLE:
         return values
@@ -39,9 +41,13 @@ def real(values: Any) -> np.ndarray:
     if isinstance(values, (list, tuple)):
         _check_entries(values)
     try:
-        array = np.asanyarray(values)
+        where = _device_of(values)
+        if where in HERE:
+            array = np.asanyarray(values if where is None or hasattr(values, "__array__") else np.from_dlpack(values))
     except Exception as error:  # rows of different lengths, or whatever __array__ and __len__ of a user's class raise
         raise NotReal(f"no array of numbers ({error})") from None
+    if where not in HERE:
+        raise NotReal(f"an array on a device of the type {where} of DLPack; copy it into the memory of this process")
     if np.ma.isMaskedArray(array):
         raise NotReal(MASKED)
     array = np.asarray(array)
@@ -121,6 +127,13 @@ def _is_truth(value: Any) -> bool:
     """Whether it is True or False, of Python, NumPy or SymPy, which this module does not import, or an array of such."""
     return isinstance(value, (bool, np.bool_)) or getattr(value, "is_Boolean", False) is True \
         or (isinstance(value, np.ndarray) and value.dtype.kind == "b")
+
+
+def _device_of(values: Any) -> int | None:
+    """The type of the device that an array of another library lies on, by the protocol DLPack; None for what has none."""
+    if isinstance(values, (np.ndarray, np.generic)) or not hasattr(values, "__dlpack_device__") or isinstance(values, type):
+        return None
+    return int(values.__dlpack_device__()[0])
 
 
 def _double(value: Any) -> float:

@@ -1,14 +1,19 @@
-"""What a request would take of the machine's memory: looked at before any is taken."""
+"""What a request would take of the machine's memory, looked at before any is taken; arrays that libraries share."""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from pathlib import Path
+
+import numpy as np
 
 from symdyn.errors import ArgumentError
 
 DOUBLE = 8
+# Of addresses, bytes: arrays of JAX begin at multiples of it.
+ALIGNMENT = 64
 # Where a container's limit stands (versions 2 and 1 of Linux control groups), and what it has used.
 _GROUPS = (("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
            ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"))
@@ -53,3 +58,12 @@ def in_bytes(size: int) -> str:
     while value >= 1000 and k < len(units) - 1:
         value, k = value / 1000, k + 1
     return f"{value:.3g} {units[k]}" + (f" ({size} bytes)" if k else "")
+
+
+def aligned(shape: tuple[int, ...], value: float) -> np.ndarray:
+    """An array of doubles with one value, at an address that every library takes by DLPack without a copy, JAX's included."""
+    whole = np.empty(math.prod(shape) + ALIGNMENT // DOUBLE)
+    first = -whole.ctypes.data % ALIGNMENT // DOUBLE
+    result = whole[first:first + math.prod(shape)].reshape(shape)
+    result.fill(value)
+    return result

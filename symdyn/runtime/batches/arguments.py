@@ -48,6 +48,20 @@ def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[st
     return rows
 
 
+def side_by_side(groups: Sequence[np.ndarray], n: int) -> np.ndarray:
+    """Tables (n, n_k), or (1, n_k), as one with n rows: the memory that they are in, where they are neighbours in one array."""
+    parts = [group for group in groups if group.shape[1]]
+    width, first = sum(group.shape[1] for group in parts), parts[0] if parts else np.zeros((n, 0))
+    places, after = [], first.ctypes.data
+    for group in parts:
+        places.append(after)
+        after += group.shape[1] * first.strides[1]
+    if parts and all(len(group) == n and group.strides == first.strides and group.ctypes.data == place
+                     for group, place in zip(parts, places, strict=True)) and n > 1:
+        return np.lib.stride_tricks.as_strided(first, (n, width), writeable=False)
+    return np.concatenate([np.broadcast_to(group, (n, group.shape[1])) for group in groups], axis=1)
+
+
 def together(tables: Mapping[str, np.ndarray], owner: str) -> int:
     """How many trajectories there are: what has one row holds for all. Raises ArgumentError where the numbers differ."""
     lengths = {what: len(rows) for what, rows in tables.items() if len(rows) != 1}

@@ -15,7 +15,7 @@ from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.kinds import flag
-from symdyn.runtime.batches.arguments import take_rows, together
+from symdyn.runtime.batches.arguments import side_by_side, take_rows, together
 from symdyn.runtime.batches.on_device import on_device
 from symdyn.runtime.batches.precision import checked_precision
 from symdyn.runtime.batches.sensitivities import Columns
@@ -37,7 +37,7 @@ from symdyn.runtime.integrating.simulate import (
     checked_times,
     checked_tolerances,
 )
-from symdyn.runtime.memory import demand
+from symdyn.runtime.memory import aligned, demand
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -88,7 +88,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
            f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
-    starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
+    starts = side_by_side(groups, n_starts)
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
@@ -241,7 +241,7 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
     which       where these are some of more motions: their numbers there
     """
     n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
-    x = np.full((n, len(asked.times), n_x), np.nan)
+    x = aligned((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
     messages: dict[int, str] = {}
     doubts: dict[int, Sequence[str]] = {}
@@ -249,7 +249,7 @@ def _one_by_one(module: Module, asked: Asked, inputs: Any, used: np.ndarray, not
     begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
     by = tuple(options.get("sensitivities", ()))
-    columns = np.full((*x.shape, len(by)), np.nan)
+    columns = aligned((*x.shape, len(by)), np.nan)
     nowhere_columns = np.full((n_x, len(by)), np.nan)
 
     def solution() -> BatchSolution:

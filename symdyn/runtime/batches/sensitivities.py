@@ -14,6 +14,7 @@ from symdyn.runtime.constraints import rank
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.sensitivities import Asked, sizes_of, tolerances
 from symdyn.runtime.integrating.without_effect import ROUNDING, groups_of, sizes
+from symdyn.runtime.memory import aligned
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -55,6 +56,13 @@ class Columns:
     def behind(self, states: np.ndarray) -> np.ndarray:
         """States (n, n_x) with the columns' starts behind them."""
         return np.hstack([states, np.broadcast_to(self.asked.starts.ravel(), (len(states), self.asked.starts.size))])
+
+    def apart(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Copies of states (n, n_t, n_x), and of their derivatives (n, n_t, n_x, n_columns), from states with columns."""
+        n, n_t, n_x = *states.shape[:2], states.shape[2] // (1 + self.n)
+        x, matrix = aligned((n, n_t, n_x), 0.0), aligned((n, n_t, n_x, self.n), 0.0)
+        x[:], matrix[:] = states[..., :n_x], np.swapaxes(_behind(self, states), 2, 3)
+        return x, matrix
 
     def tolerances(self, rtol: float, atol: np.ndarray) -> tuple[float, np.ndarray]:
         """Relative, and absolute ones of every motion, (n, n_x (1 + n_columns)), or (1, ...)."""

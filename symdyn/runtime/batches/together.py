@@ -22,6 +22,7 @@ from symdyn.runtime.integrating.run_record import STATUS, RunReport
 from symdyn.runtime.integrating.sensitivities import zeros
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.masses import negative_masses
+from symdyn.runtime.memory import aligned
 
 if TYPE_CHECKING:
     from symdyn.runtime.inputs.inputs import Inputs
@@ -73,7 +74,7 @@ class Together:
     def __init__(self, module: Module, asked: Asked) -> None:
         n, n_x = asked.n, module.metadata.sizes.x * (1 if asked.columns is None else 1 + asked.columns.n)
         self.module, self.asked = module, asked
-        self.x = np.full((n, len(asked.times), n_x), np.nan)
+        self.x = aligned((n, len(asked.times), n_x), np.nan)
         self.reports = np.zeros(n, dtype=np.dtype(RunReport))
         self.reports["status"] = STATUS.STEP_LIMIT
         self.states = np.full((n, 2, n_x), np.nan)
@@ -107,7 +108,9 @@ class Together:
         Raises SimulationInterrupted where that was interrupted.
         """
         module, reports, n, columns = self.module, self.reports, self.asked.n, self.asked.columns
-        x = self.x if columns is None else np.ascontiguousarray(self.x[..., :module.metadata.sizes.x])
+        x, matrix = self.x, None
+        if columns is not None:
+            x, matrix = columns.apart(self.x)
         success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
         late = reports["status"] == STATUS.STEP_LIMIT
         doubts: dict[int, list[str]] = {}
@@ -149,8 +152,6 @@ class Together:
         for k in moved[~late[moved]].tolist():
             far = moved_far(module.name, reports["largest_moved"][k], reports["t_moved"][k], columns is not None)
             doubts.setdefault(k, []).append(far)
-        matrix = None if columns is None else np.ascontiguousarray(np.swapaxes(
-            self.x[..., module.metadata.sizes.x:].reshape(*x.shape[:2], columns.n, x.shape[2]), 2, 3))
         if late.any() and not interrupted:
             again = np.flatnonzero(late)
             single = alone(again)
