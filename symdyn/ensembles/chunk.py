@@ -16,18 +16,22 @@ from symdyn.arguments import take
 from symdyn.backend.right_side import METHOD
 from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
-from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
+from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, MissingExtra, SimulationWarning, SymdynError
 from symdyn.runtime.batches.motions import IN_LANES, why_columns_one_by_one, why_one_by_one
+from symdyn.runtime.gpu.device import OfDevice
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.events import wanted
-from symdyn.runtime.integrating.outcome import Outcome
+from symdyn.runtime.integrating.simulate import checked_tolerances
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
+from symdyn.runtime.solutions.states_only import StatesOnly
 from symdyn.shown import shown
 
 GROUPS = ("q", "u", "z", "parameters", "inputs")
 # Longer messages of failed members are cut.
 MESSAGE = 400
+# The relative tolerance of `simulate`, where none is given.
+RTOL = 1e-8
 # Members whose doubts are listed.
 LISTED = 3
 # Numbers of motions that are held at a time, 8 bytes each; of a device, which computes more of them at once.
@@ -49,7 +53,7 @@ class Setting:
     options      of `simulate`
     shapes       of the outcomes of one member
     vectors      several members are integrated at once on one processor core, or on a device
-    device       "cpu", or the GPU that integrates them
+    device       "cpu", or the GPU that integrates them; precision: of its numbers
     """
 
     system: Any
@@ -63,6 +67,7 @@ class Setting:
     shapes: tuple[tuple[int, ...], ...] = ()
     vectors: bool = False
     device: str = "cpu"
+    precision: str = "double"
 
 
 @dataclass(frozen=True)
@@ -143,7 +148,8 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
         groups = _groups(setting, values[part])
         try:
             batch = module.simulate_batch(groups["q"], groups["u"], groups["parameters"], z=groups["z"], t=times,
-                                          inputs=groups["inputs"], device=setting.device, **setting.options)
+                                          inputs=groups["inputs"], device=setting.device, precision=setting.precision,
+                                          **setting.options)
         except SymdynError as error:  # of all of them: each reports it for itself
             _raise_others(error)
             _one_by_one(setting, values, part, done)
@@ -166,9 +172,8 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
                 over_time = batch.x[well, :, states.index(measure.name)].T
                 done.columns[measure.label][part[well]] = measure.reduce(times, over_time).T
         for place in well.tolist() if others else ():
-            outcome = Outcome(times, batch.x[place], True, "reached the end", False, int(batch.n_steps[place]),
-                              int(batch.n_rejected[place]), 0)
-            solution = Solution(module, outcome, groups["parameters"][place], Inputs(groups["inputs"][place]), "dop853", 0.0)
+            solution = _states_only(setting, batch.x[place], (int(batch.n_steps[place]), int(batch.n_rejected[place])),
+                                    groups["parameters"][place], groups["inputs"][place])
             try:
                 for measure in others:
                     shape = setting.shapes[setting.measures.index(measure)]
@@ -178,9 +183,24 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
                 done.fail(int(part[place]), error)
 
 
+def as_measured(setting: Setting, solution: Solution) -> Solution:
+    """A motion of its own as outcomes get it: from a device with no more than is known there."""
+    if setting.device == "cpu":
+        return solution
+    return _states_only(setting, solution.x, (solution.n_steps, solution.n_rejected), solution.params, solution.inputs[0])
+
+
+def _states_only(setting: Setting, x: np.ndarray, steps: tuple[int, int], params: np.ndarray, inputs: np.ndarray) -> StatesOnly:
+    """What outcomes get of a motion that was integrated together with others."""
+    module: Module = setting.system.module
+    rtol, atol = checked_tolerances(module, setting.options.get("rtol", RTOL), setting.options.get("atol"))
+    return StatesOnly(module, setting.times, x, steps, params, inputs, setting.options.get("method", METHOD),
+                      (rtol, float(atol.max(initial=0.0))))
+
+
 def _raise_others(error: Exception) -> None:
     """What this process lacks is no fault of a member: another one may have it."""
-    if isinstance(error, (NotSent, CompileError, CompilerNotFound, MemoryError)):
+    if isinstance(error, (NotSent, CompileError, CompilerNotFound, MissingExtra, OfDevice, MemoryError)):
         raise error
 
 
@@ -196,9 +216,11 @@ def held_at_once(setting: Setting) -> int:
 
 
 def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any], measures: Sequence[Measure]) -> bool:
-    """Whether motions can be integrated several at once, with the very steps of `simulate`."""
+    """Whether motions can be integrated several at once, with the very steps of `simulate`; not for functions, which may ask a
+    Solution for whatever a run of its own knows."""
     n, look = len(options.get("sensitivities", ())), wanted(module, options.get("events", True))
     return (not (why_one_by_one(module) or consistent) and events_serve(module, options, measures)
+            and not any(m.kind == "function" for m in measures)
             and options.get("method", METHOD) in IN_LANES and not why_columns_one_by_one(module, look, n)
             and not (n and any(m.name not in module.metadata.x for m in measures))
             and set(options) <= {"rtol", "atol", "max_step", "first_step", "method", "events", "event_spacing", "sensitivities",

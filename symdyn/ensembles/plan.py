@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.backend.right_side import METHOD, RightSide
-from symdyn.ensembles.chunk import Chunk, Setting, events_serve, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.chunk import RTOL, Chunk, Setting, as_measured, events_serve, motion, quiet, setting_of, vectors_serve
 from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
 from symdyn.ensembles.portable import PortableModule, of_contacts
@@ -17,12 +17,14 @@ from symdyn.ensembles.samples import Samples
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound
 from symdyn.kinds import flag
 from symdyn.runtime.batches.motions import unit_of
-from symdyn.runtime.batches.on_device import demand_fit
+from symdyn.runtime.batches.on_device import demand_fit, demand_single
+from symdyn.runtime.batches.precision import checked_precision
 from symdyn.runtime.batches.states import LIBRARY
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.sensitivities import names_of
+from symdyn.runtime.integrating.simulate import checked_tolerances
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 
@@ -35,6 +37,8 @@ CHUNK, CHUNK_OF_DEVICE, PARTS = 1000, 100_000, 16
 MOST_CHUNKS, CHUNK_BYTES = 10_000, 2**26
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
 TRIED = 8
+# Of results by a GPU, whatever its number on a machine: several of them may share a folder.
+GPU = "gpu"
 # From so many samples on it is worth compiling code that integrates several motions at once.
 VECTORS_FROM = 2000
 
@@ -98,7 +102,8 @@ class Plan:
                 "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": self.samples.record(),
                 "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
                 "outcomes": {m.label: m.record() for m in setting.measures}, "consistent": setting.consistent,
-                "vectors": setting.vectors, **({} if setting.device == "cpu" else {"device": setting.device}),
+                "vectors": setting.vectors,
+                **({} if setting.device == "cpu" else {"device": GPU, "precision": setting.precision}),
                 "base": {k: v.tolist() for k, v in setting.base.items()},
                 "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}
 
@@ -111,12 +116,12 @@ class Plan:
                 "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata.units},
                 "about": {m.label: m.record() for m in measures},
                 "sensitivities": list(self.setting.options.get("sensitivities", ())),
-                "rtol": self.setting.options.get("rtol", 1e-8)}
+                "rtol": self.setting.options.get("rtol", RTOL)}
 
 
 def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: Any = None, u: Any = None, z: Any = None,
          params: Any = None, inputs: Any = None, chunk: Any = None, consistent: Any = False, functions: tuple[str, ...] = (),
-         sensitivities: Any = None, device: str = "cpu", **options: Any) -> Plan:
+         sensitivities: Any = None, device: str = "cpu", precision: Any = None, **options: Any) -> Plan:
     """The plan of an ensemble from the arguments of `ensemble`; options: of `simulate`, None as there.
 
     Raises ArgumentError for what does not fit.
@@ -131,13 +136,14 @@ def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: A
     options |= _derivatives(module, drawn, measures, sensitivities)
     times = output_times(t, measures, module)
     gpu = devices.device_number(device, module.name)
+    precision = checked_precision("double" if precision is None else precision, gpu is not None, module.name)
     if gpu is not None:
-        _check_device(module, gpu, options, consistent, measures)
+        _check_device(module, options, consistent, measures, precision)
     vectors = gpu is not None or (drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options, measures))
     method, looks = str(options.get("method", METHOD)), bool(wanted(module, options.get("events", True)).any())
     by = names_of(module, options.get("sensitivities", ()), [])
     lanes = unit_of(method, looks, tuple("" if state else name for name, state in by.items())) if gpu is None else RightSide(
-        method=method, threads=True, looks=looks)
+        method=method, threads=True, looks=looks, single=precision == "single")
     together = [lanes, *[LIBRARY] * (gpu is None)] if vectors else []
     portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions, *together])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
@@ -146,7 +152,7 @@ def plan(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: A
                             "over time as an expression in sd.t, with parameters that samples may change, or run "
                             "module.simulate_batch, which takes functions, splines and tables")
     setting = setting_of(portable, drawn.names, times, measures, given, consistent, options)
-    setting = replace(setting, vectors=vectors, device="cpu" if gpu is None else device)
+    setting = replace(setting, vectors=vectors, device="cpu" if gpu is None else device, precision=precision)
     return Plan(setting, drawn, whole(chunk, "chunk", module))
 
 
@@ -159,18 +165,29 @@ def whole(value: object, what: str, module: Module) -> int | None:
     return int(value)
 
 
-def _check_device(module: Module, number: int, options: Mapping[str, Any], consistent: bool,
-                  measures: Sequence[Measure]) -> None:
-    """Raises ArgumentError for what a device does not take, and where it is not there; MissingExtra."""
+def _check_device(module: Module, options: Mapping[str, Any], consistent: bool, measures: Sequence[Measure],
+                  precision: str) -> None:
+    """Raises ArgumentError for what no device takes; whether there is one is found out where motions are computed."""
+    method = options.get("method", METHOD)
     others = {name: value for name, value in options.items() if name not in ("events", "event_spacing")}
-    demand_fit(module, options.get("method", METHOD), None, others)
+    demand_fit(module, method, None, others)
     if consistent:
         raise ArgumentError(f"{module.name}: device='gpu' takes starts as they are; leave consistent out, or sample starts that "
                             "fulfil the constraints")
     if not events_serve(module, options, measures):
         raise ArgumentError(f"{module.name}: device='gpu' keeps states at output times and no times of events; take outcomes of "
                             "states and events that do not stop the motion, pass events=False, or leave device out")
-    devices.open_device(number, module.name).close()
+    if precision == "single":
+        looks = bool(wanted(module, options.get("events", True)).any())
+        demand_single(module, method, looks, checked_tolerances(module, options.get("rtol", RTOL), options.get("atol"))[0])
+
+
+def demand_device(setting: Setting) -> None:
+    """Raises NoDevice where motions are to be computed on a GPU of this machine that is not there; MissingExtra."""
+    owner = setting.system.module.name
+    number = devices.device_number(setting.device, owner)
+    if number is not None:
+        devices.open_device(number, owner).close()
 
 
 def _derivatives(module: Module, samples: Samples, measures: Sequence[Measure], given: Any) -> dict[str, Any]:
@@ -195,7 +212,7 @@ def _tried(setting: Setting, samples: Samples) -> Setting:
     wrong: list[ArgumentError] = []
     for k in places:
         try:
-            solution = motion(setting, samples.block(k, k + 1)[0])
+            solution = as_measured(setting, motion(setting, samples.block(k, k + 1)[0]))
             return replace(setting, shapes=tuple(m.of(solution).shape for m in setting.measures))
         except ArgumentError as error:
             wrong.append(error)

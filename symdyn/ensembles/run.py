@@ -23,11 +23,11 @@ from symdyn.ensembles.claims import ATTEMPTS, BEATS, LEASE, Claims, Heartbeat
 from symdyn.ensembles.dispatch import AHEAD, ExecutorFailed, run_chunks
 from symdyn.ensembles.exports import EXPORTS, demand_formats
 from symdyn.ensembles.lock import OneRun
-from symdyn.ensembles.plan import Plan, plan, whole
+from symdyn.ensembles.plan import Plan, demand_device, plan, whole
 from symdyn.ensembles.progress import Progress, own_name
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
-from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
+from symdyn.ensembles.store import RESULT, Store, check_folder, check_same, write_manifest
 from symdyn.errors import ArgumentError, EnsembleStopped, SimulationWarning
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
@@ -56,7 +56,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
              atol: float | Row | None = None, method: str | type | None = None, max_step: float | None = None,
              first_step: float | None = None, max_steps: int | None = None,
              stabilization: str | tuple[str, float] | None = None, events: bool | str | Sequence[str] | None = None,
-             event_spacing: float | None = None, sensitivities: Names | None = None, device: str = "cpu") -> Ensemble:
+             event_spacing: float | None = None, sensitivities: Names | None = None, device: str = "cpu",
+             precision: str | None = None) -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -88,13 +89,16 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     sensitivities   what outcomes with "grad" are by, as for `simulate`: parameters, inputs, and initial values as "q1(0)";
                 default: what is sampled
     device      "cpu", or "gpu", "gpu:1": members are integrated on an NVIDIA GPU, as `simulate_batch` does; chunks are 100,000
-                samples, and one thread hands them to it, unless asked otherwise
+                samples, and one thread hands them to it, unless asked otherwise. Functions get states at output times there,
+                and what is computed from these; what else they ask for raises
+    precision   "double", or of a GPU "single", as for `simulate_batch`; None: "double"
 
-    From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
-    that fails has no numbers in its row, and is listed in `failures`. Warnings of single motions are not given, but one
-    SimulationWarning reports members whose derivatives are outcomes and were warned of. Returns an Ensemble. Raises
-    ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an executor died or
-    the disk is full: what was done is kept, if there is a path; MissingExtra where a format needs a package.
+    From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so and no outcome is
+    a function, which may ask a Solution for whatever a run of its own knows. A member that fails has no numbers in its row,
+    and is listed in `failures`. Warnings of single motions are not given, but one SimulationWarning reports members whose
+    derivatives are outcomes and were warned of. Returns an Ensemble. Raises ArgumentError for what does not fit, and where
+    another run is at work in the folder; EnsembleStopped where an executor died or the disk is full: what was done is kept, if
+    there is a path; MissingExtra where a format needs a package.
 
     >>> import tempfile
     >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -105,9 +109,9 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     resume, shared, progress = (flag(v, f"an ensemble: {what}") for v, what in (
         (resume, "resume"), (shared, "shared"), (progress, "progress")))
     asked = plan(system, samples, t, outcomes, q=q, u=u, z=z, params=params, inputs=inputs, chunk=chunk, consistent=consistent,
-                 functions=functions, sensitivities=sensitivities, device=device, rtol=rtol, atol=atol, method=method,
-                 max_step=max_step, first_step=first_step, max_steps=max_steps, stabilization=stabilization, events=events,
-                 event_spacing=event_spacing)
+                 functions=functions, sensitivities=sensitivities, device=device, precision=precision, rtol=rtol, atol=atol,
+                 method=method, max_step=max_step, first_step=first_step, max_steps=max_steps, stabilization=stabilization,
+                 events=events, event_spacing=event_spacing)
     module: Module = asked.setting.system.module
     how = How(executor, whole(outstanding, "outstanding", module), progress, demand_formats(formats, module.name),
               LEASE if shared else None)
@@ -179,6 +183,8 @@ def _warned(result: Ensemble, level: int) -> Ensemble:
 
 
 def _in_folder(asked: Plan, folder: Path, how: How, resume: bool, lasting: bool) -> Ensemble:
+    if how.executor is None and not (folder / RESULT).is_file():
+        demand_device(asked.setting)
     try:
         asked, store = prepare(asked, folder, resume)
     except OSError as error:

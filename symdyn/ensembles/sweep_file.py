@@ -7,6 +7,7 @@ A sweep file is data, which may come from anyone: it runs no program, and its re
     t = [0, 10]                         # s; or {from = 0, to = 10, count = 101}
     rtol = 1e-8
     device = "gpu"                      # default: the processor
+    precision = "single"                # of a GPU; default: double
     sampling = "latin_hypercube"        # or random, sobol, grid, paired
     count = 1000
     seed = 1
@@ -43,20 +44,21 @@ from symdyn.ensembles.cluster import Cluster, read_cluster
 from symdyn.ensembles.exports import EXPORTS
 from symdyn.ensembles.samples import SAMPLINGS, Samples
 from symdyn.errors import ArgumentError
+from symdyn.runtime.batches.precision import PRECISIONS
 from symdyn.shown import shown
 
 TABLES = {"parameters": ("parameters",), "initial": ("q", "u", "z"), "inputs": ("inputs",)}
 # Key -> what its value must be.
 KEYS = {"system": "text", "options": "table", "formulation": "text", "coordinates": "text", "t": "times", "rtol": "positive",
         "atol": "positive", "method": "text", "max_steps": "whole", "max_step": "positive", "stabilization": "text",
-        "device": "text", "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
-        "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs", "output": "folder", "formats": "texts",
-        "cluster": "cluster", "dask": "cluster", **dict.fromkeys(TABLES, "table")}
-OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities", "device")
+        "device": "text", "precision": "text", "consistent": "true or false", "sampling": "text", "count": "whole",
+        "seed": "whole", "chunk": "whole", "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs",
+        "output": "folder", "formats": "texts", "cluster": "cluster", "dask": "cluster", **dict.fromkeys(TABLES, "table")}
+OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities", "device", "precision")
 # No double is larger; whole numbers of TOML have any number of digits.
 LARGEST = sys.float_info.max
 CHOICES = {"formulation": ("auto", "embedding", "recursive", "augmented"), "coordinates": ("relative", "absolute"),
-           "sampling": SAMPLINGS, "stabilization": ("projection", "baumgarte", "none")}
+           "sampling": SAMPLINGS, "stabilization": ("projection", "baumgarte", "none"), "precision": tuple(PRECISIONS)}
 
 
 @dataclass

@@ -21,7 +21,7 @@ from symdyn.ensembles import chunk, plan, portable, store
 from symdyn.ensembles.archive import thinned
 from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
-from symdyn.ensembles.measures import take_measures
+from symdyn.ensembles.measures import Measure, take_measures
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
 from symdyn.runtime.building import texts
@@ -556,22 +556,34 @@ def test_motions_on_vectors_have_the_outcomes_of_single_ones(module, monkeypatch
     angles = np.linspace(-1, 1, 20)
     angles[7] = np.nan
     samples = {"q1": angles, "l1": np.linspace(0.5, 1.5, 20)}
-    outcomes = {"end": "end q1", "mean": "mean q2", "at": "q2_dot at 0.2", "all": "trace q1", "energy": "max energy",
-                "far": farthest, "some": sometimes_far}
+    outcomes = {"end": "end q1", "mean": "mean q2", "at": "q2_dot at 0.2", "all": "trace q1", "energy": "max energy"}
     one = sd.ensemble(module, samples, np.linspace(0, 0.5, 6), outcomes, chunk=9)
     monkeypatch.setattr(plan, "VECTORS_FROM", 1)
     monkeypatch.setattr(chunk, "NUMBERS", 150)  # six motions at a time
+    monkeypatch.setattr(chunk, "motion", None)  # which would simulate one alone
     several = sd.ensemble(module, samples, np.linspace(0, 0.5, 6), outcomes, chunk=9)
-    assert several.failures() == one.failures() and {f["index"] for f in one.failures()} == {7, 19}
-    for label in ("end", "at", "all", "energy", "far", "some"):
+    assert several.failures() == one.failures() and {f["index"] for f in one.failures()} == {7}
+    for label in ("end", "at", "all", "energy"):
         assert np.array_equal(one[label], several[label], equal_nan=True), label
     np.testing.assert_allclose(several["mean"], one["mean"], rtol=1e-13)
 
 
-def sometimes_far(solution):
-    if solution.q[0, 0] == 1.0:
-        raise ValueError("too far")
-    return solution.n_steps
+@pytest.mark.parametrize("method", ["dop853", "bs54"])
+def test_functions_get_motions_of_their_own_however_many_samples_there_are(monkeypatch, method):
+    four_bar = recall("four_bar", {})
+    outcomes = {"moved": lambda sol: sol.corrections.position, "evaluations": lambda sol: sol.nfev, "fine": middle,
+                "rtol": lambda sol: sol.tolerances[0], "method": lambda sol: float(sol.method == method)}
+    monkeypatch.setattr(plan, "VECTORS_FROM", 4)
+    few, many = (sd.ensemble(four_bar, {"g": np.linspace(9, 10, 5)[:n]}, (0, 0.1), outcomes, method=method) for n in (3, 5))
+    assert few.n_failed == many.n_failed == 0 and (many["method"] == 1).all() and (many["rtol"] == 1e-8).all()
+    motion = four_bar.simulate((0, 0.1), params={"g": 10.0}, method=method)
+    assert many["evaluations"][4] == motion.nfev > 0 and many["moved"][4] == motion.corrections.position > 0
+    for label in outcomes:
+        assert np.array_equal(many[label][:3], few[label]), label
+
+
+def middle(solution):
+    return solution(np.linspace(0, 0.1, 7))[:, 0].max()
 
 
 def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeypatch):
@@ -587,6 +599,7 @@ def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeyp
     ("double_pendulum", {"method": "radau"}, False)])
 def test_vectors_serve_where_they_take_the_same_steps(name, options, expected):
     assert chunk.vectors_serve(recall(name, {}), False, options, ()) is expected
+    assert not chunk.vectors_serve(recall(name, {}), False, options, [Measure("far", "function", function=farthest)])
 
 
 def test_vectors_serve_events_that_outcomes_need_no_times_of():

@@ -27,6 +27,7 @@ from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.gpu import compiling
 from symdyn.runtime.gpu.motions import Motions
+from symdyn.runtime.solutions.states_only import NOT_KEPT
 from tests.helpers import swept
 from tests.runtime.constrained import module as constrained
 
@@ -242,6 +243,29 @@ def test_ensembles_and_sweep_files(host: HostDevice, tmp_path: Path) -> None:
     file.write_text('system = "double_pendulum"\ndevice = "gpu:1"\n[initial]\nq1 = [0.1, 0.2]\n')
     faults: list[str] = []
     assert read_sweep(file, faults).arguments(module)["device"] == "gpu:1" and not faults
+
+
+def test_functions_get_what_is_known_on_a_device(host: HostDevice) -> None:
+    """The rest raises, before any motion is computed."""
+    module, drawn = compiled("double_pendulum"), {"q1": np.linspace(-1, 1, 6)}
+    known = {"far": lambda sol: np.abs(sol.q).max(axis=0), "energy": lambda sol: sol.energy[-1], "steps": lambda sol: sol.n_steps,
+             "bs54": lambda sol: float(sol.method == "bs54"), "rtol": lambda sol: sol.tolerances[0],
+             "mass": lambda sol: sol.params[0], "momentum": lambda sol: sol.rows("mass_matrix")[-1] @ sol.u[-1]}
+    there = sd.ensemble(module, drawn, (0, 1), known, method="bs54", rtol=1e-6, device="gpu")
+    here = sd.ensemble(module, drawn, (0, 1), known, method="bs54", rtol=1e-6)
+    assert there.n_failed == here.n_failed == 0 and (here["bs54"] == 1).all() and (here["rtol"] == 1e-6).all()
+    for label in known:
+        assert np.array_equal(there[label], here[label]), label
+    host.log.clear()
+    for name in NOT_KEPT:
+        with pytest.raises(ArgumentError, match=f"{name} is not known of a motion that was integrated together with others; "
+                                                "there are t, x, params, .*; leave device out, so that functions get motions"):
+            sd.ensemble(module, drawn, (0, 1), {"it": lambda sol, name=name: getattr(sol, name)}, device="gpu")
+    with pytest.raises(ArgumentError, match="states at any time need a motion that simulate has integrated"):
+        sd.ensemble(module, drawn, (0, 1), {"it": lambda sol: sol(np.linspace(0, 1, 5))}, device="gpu")
+    assert not host.log
+    wrong = sd.ensemble(module, drawn, (0, 1), {"it": lambda sol: sol.nothing}, device="gpu")
+    assert "'StatesOnly' has no attribute 'nothing'" in wrong.failures()[0]["message"]
 
 
 # -- what a device does not take

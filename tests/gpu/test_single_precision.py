@@ -3,6 +3,7 @@ forms, and as code of a GPU."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.special import ellipj, ellipk
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
+from symdyn.ensembles.sweep_file import read_sweep
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.gpu import compiling
 
@@ -110,6 +112,33 @@ def test_what_single_precision_does_not_take(host: HostDevice) -> None:
     system.add_event("floor", x, stop=True)
     with pytest.raises(ArgumentError, match="does not take events, whose times are found to rounding; pass events=False"):
         system.embedding().compile(backend="c").simulate_batch(t=(0, 1), rtol=1e-5, device="gpu", precision="single")
+
+
+def test_ensembles_and_sweep_files(host: HostDevice, tmp_path: Path) -> None:
+    module, drawn, outcomes = compiled("double_pendulum"), {"q1": np.linspace(-1, 1, 40)}, ["end q1", "max energy"]
+    asked: dict[str, Any] = {"t": (0, 0.5), "outcomes": outcomes, "rtol": 1e-6, "method": "bs54"}
+    single, double = (sd.ensemble(module, drawn, **asked, device="gpu", precision=one) for one in ("single", None))
+    here = sd.ensemble(module, drawn, **asked)
+    assert np.array_equal(double["end q1"], here["end q1"])
+    off = np.abs(single["end q1"] - here["end q1"])
+    assert 0 < off.max() < 1e-5 and len(set(off)) > 20
+    sd.ensemble(module, drawn, **asked, device="gpu", path=tmp_path / "a")
+    with pytest.raises(ArgumentError, match='precision: "double" there, "single" now'):
+        sd.ensemble(module, drawn, **asked, device="gpu", precision="single", path=tmp_path / "a", resume=True)
+    with pytest.raises(ArgumentError, match="precision='single' is that of a device; pass device='gpu', or leave it out"):
+        sd.ensemble(module, drawn, **asked, precision="single")
+    with pytest.raises(ArgumentError, match="precision must be 'double' or 'single', found ''"):
+        sd.ensemble(module, drawn, **asked, device="gpu", precision="")
+    begun = len(host.log)
+    with pytest.raises(ArgumentError, match="precision='single' does not take rtol=1e-08; pass 1e-06 or more"):
+        sd.ensemble(module, drawn, (0, 1), device="gpu", precision="single")
+    assert len(host.log) == begun
+    file, faults = tmp_path / "swings.toml", list[str]()
+    file.write_text('system = "double_pendulum"\ndevice = "gpu"\nprecision = "single"\n[initial]\nq1 = [0.1, 0.2]\n')
+    assert read_sweep(file, faults).arguments(module)["precision"] == "single" and not faults
+    file.write_text('system = "double_pendulum"\nprecision = "half"\n[initial]\nq1 = [0.1, 0.2]\n')
+    read_sweep(file, faults)
+    assert faults == ["precision: must be one of double, single, found 'half'"]
 
 
 @pytest.mark.parametrize(("name", "method"), [("double_pendulum", "dop853"), ("cart_pole", "bs54")])

@@ -37,7 +37,7 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
     method = options.get("method", METHOD)
     demand_fit(module, method, asked.along, options)
     if precision == "single":
-        _demand_single(module, method, asked)
+        demand_single(module, method, asked.looks, asked.rtol)
     device = devices.open_device(number, module.name)
     try:
         library: Any = module.library(RightSide(method=method, threads=True, looks=asked.looks,
@@ -75,7 +75,7 @@ def _take(motions: Together, work: Work) -> None:
             motions.reports[name] = work.reports[name]
 
 
-def _demand_single(module: Module, method: str, asked: Asked) -> None:
+def demand_single(module: Module, method: str, looks: bool, rtol: float) -> None:
     """Raises ArgumentError with all that needs double precision."""
     faults = []
     if METHODS[method].tableau is None:
@@ -83,10 +83,10 @@ def _demand_single(module: Module, method: str, asked: Asked) -> None:
         faults.append(f"method={method!r}, whose equations are solved to rounding; pass {explicit}")
     if module.metadata.constraints:
         faults.append(f"the constraints {', '.join(module.metadata.constraints)}, which are kept to 1e-12")
-    if asked.looks:
+    if looks:
         faults.append("events, whose times are found to rounding; pass events=False where they do not matter")
-    if asked.rtol < LEAST_RTOL:
-        faults.append(f"rtol={asked.rtol:g}; pass {LEAST_RTOL:g} or more")
+    if rtol < LEAST_RTOL:
+        faults.append(f"rtol={rtol:g}; pass {LEAST_RTOL:g} or more")
     if faults:
         raise ArgumentError(f"{module.name}: precision='single' does not take {'; '.join(faults)}. Leave precision out for "
                             "doubles")

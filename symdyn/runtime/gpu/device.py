@@ -7,13 +7,25 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
+from symdyn.errors import ArgumentError, EvaluationError, MissingExtra, SymdynError
 from symdyn.runtime.gpu.compiling import INSTALL, cubin
 from symdyn.runtime.gpu.dlpack import CUDA
 from symdyn.shown import shown
 
 # Threads of a block: four warps.
 BLOCK = 128
+
+
+class OfDevice(SymdynError):
+    """What a device lacks or does not do, whatever the motions are; the base of the two below."""
+
+
+class NoDevice(OfDevice, ArgumentError):
+    """There is no such device, or it has too little memory."""
+
+
+class DeviceFailed(OfDevice, EvaluationError):
+    """A call of the driver failed."""
 
 
 class Device(Protocol):
@@ -64,20 +76,21 @@ class Cuda:
     """A device of NVIDIA's, by its number."""
 
     def __init__(self, number: int, owner: str) -> None:
-        """owner: of messages. Raises MissingExtra, ArgumentError where there is no such device."""
+        """owner: of messages. Raises MissingExtra, NoDevice."""
         try:
             from cuda.bindings import driver
         except ImportError:
             raise MissingExtra(f"device='gpu' needs the package cuda-bindings: {INSTALL}") from None
         self.driver, self.owner = driver, owner
+        asked = f"gpu:{number}" if number else "gpu"
         try:
             self._call("cuInit", 0)
             count = self._call("cuDeviceGetCount")
-        except (RuntimeError, EvaluationError) as error:
-            raise ArgumentError(f"{owner}: device='gpu' was asked for, but this machine has no CUDA device that answers "
+        except (RuntimeError, DeviceFailed) as error:
+            raise NoDevice(f"{owner}: device={asked!r} was asked for, but this machine has no CUDA device that answers "
                                 f"({str(error).splitlines()[0]}); leave device out to compute on the processor") from None
         if number >= count:
-            raise ArgumentError(f"{owner}: device='gpu:{number}' was asked for; there are {count}, numbered from 0")
+            raise NoDevice(f"{owner}: device={asked!r} was asked for; there are {count}, numbered from 0")
         self._device = self._call("cuDeviceGet", number)
         # A context stays alive with the process, shared with what else uses the device there.
         self._context = self._call("cuDevicePrimaryCtxRetain", self._device)
@@ -145,7 +158,7 @@ class Cuda:
     def _call(self, name: str, *arguments: Any) -> Any:
         status, *results = getattr(self.driver, name)(*arguments)
         if int(status):
-            raise EvaluationError(f"{self.owner}: the CUDA driver's {name} failed: {status.name}")
+            raise DeviceFailed(f"{self.owner}: the CUDA driver's {name} failed: {status.name}")
         return results[0] if len(results) == 1 else results
 
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from symdyn.backend.c_records import fields_of
-from symdyn.errors import ArgumentError
 from symdyn.runtime.batches.states import Table
-from symdyn.runtime.gpu.device import Device
+from symdyn.runtime.gpu.device import Device, NoDevice
 from symdyn.runtime.gpu.turns import in_turns, parts_of
 from symdyn.runtime.inputs.tables import Pieces
 from symdyn.runtime.memory import in_bytes
@@ -101,7 +100,7 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     """Fill the results of some motions; returns what it took of the device, in words.
 
     kernel   the function `motions` of the mechanism on that device
-    Raises ArgumentError where not even a few motions fit into the memory. After a KeyboardInterrupt what is under way is waited
+    Raises NoDevice where not even a few motions fit into the memory. After a KeyboardInterrupt what is under way is waited
     for; chunks that were not begun keep their results as they were.
     """
     n, threads = len(work.x), device.at_once(kernel)
@@ -114,7 +113,7 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     free = device.free()
     most = (int(SHARE * free) - around) // SLOTS // work.bytes_each()
     if most < 1:
-        raise ArgumentError(f"{owner}: {device.name} has {in_bytes(free)} of free memory, of which two motions with "
+        raise NoDevice(f"{owner}: {device.name} has {in_bytes(free)} of free memory, of which two motions with "
                             f"{len(work.times)} output times take {in_bytes(SLOTS * work.bytes_each() + around)}; ask for fewer "
                             "output times")
     size = max(1, min(n, most, max(ROUNDS * threads, -(-n // (4 * SLOTS)))))
