@@ -54,7 +54,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     if cluster is not None and cluster.kind == "slurm" and not arguments.join and not (folder / RESULT).is_file():
         return sweep_on_cluster.submit(arguments, wanted, cluster, folder, formats)
     shared = arguments.join or (cluster is not None and cluster.kind == "folder")
-    with _executor(arguments, module, asked.values.get("device", "cpu"), cluster) as executor, \
+    with _executor(arguments, module, wanted.setting.device, cluster) as executor, \
             sweep_on_cluster.ends_on_sign(shared):
         lease = (cluster.lease if cluster is not None else LEASE) if shared else None
         how = How(executor, None, arguments.progress, formats, lease, not arguments.join or arguments.stay)
@@ -102,6 +102,12 @@ def _check_arguments(arguments: argparse.Namespace, asked: Sweep, faults: list[s
                       "pass --jobs for this machine")
     if kind == "slurm" and arguments.dask is not None:
         faults.append(f"cluster: slurm is asked for, and --dask {arguments.dask} too; leave out one of them")
+    on_gpu = asked.values.get("device", "cpu") != "cpu"
+    if on_gpu and arguments.jobs is not None:
+        faults.append(f"device: a GPU is asked for, but --jobs {arguments.jobs} is for cores; leave --jobs out, and start a "
+                      "worker for each GPU by --join, with CUDA_VISIBLE_DEVICES")
+    if not on_gpu and asked.cluster is not None and asked.cluster.gpus is not None:
+        faults.append('cluster.gpus: motions are computed by cores; give the file the line device = "gpu", or leave gpus out')
     if kind in ("slurm", "dask") and arguments.jobs is not None and not arguments.join:
         faults.append(f"cluster: {kind} is asked for, but --jobs is for this machine; write cores and workers into [cluster]")
 
@@ -171,7 +177,7 @@ def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
 def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu",
               cluster: Cluster | None = None) -> Iterator[Any]:
     """What --jobs, --dask and the file name: a cluster; threads where code is compiled, else processes, which do not wait
-    for each other; one thread where a GPU computes."""
+    for each other. None, the default of an ensemble, where a GPU of this machine computes."""
     address = arguments.dask or (cluster.address if cluster is not None and not arguments.join else None)
     if address is not None:
         try:
@@ -189,8 +195,10 @@ def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu"
     from multiprocessing import get_context
 
     cores = cluster.cores if cluster is not None and cluster.kind == "folder" else None
-    jobs = arguments.jobs or cores or (1 if device != "cpu" else os.cpu_count() or 1)
-    if module.backend == "c" or jobs == 1:
+    jobs = arguments.jobs or cores or os.cpu_count() or 1
+    if device != "cpu":
+        yield None
+    elif module.backend == "c" or jobs == 1:
         yield lambda: ThreadPoolExecutor(jobs)
     else:
         yield lambda: ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))

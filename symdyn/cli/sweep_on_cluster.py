@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Workers that --status lists, and limits that --dry-run lists.
 LISTED, LIMITS = 20, 4
+# In place of times of a device that this machine lacks.
+UNTIMED = "times on a GPU are not predicted: this machine has none that answers"
 HERE = ("localhost", "127.0.0.1", "[::1]")
 
 
@@ -134,7 +136,10 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
         job = send(home, script(cluster, plan.name, home, command, plan.setting.device != "cpu"))
     print(f"{plan.name}: Slurm's job {job} with {counted(cluster.workers or 1, 'worker')} computes "
           f"{counted(store.count, 'sample')} in {counted(store.n_chunks, 'chunk')}")
-    print(f"  predicted: {in_time(result.wall)}, {result.core / 3600:.3g} core hours, once all workers are there")
+    if measured.timed:
+        print(f"  predicted: {in_time(result.wall)}, {result.core / 3600:.3g} {_what(plan)} hours, once all workers are there")
+    else:
+        print(f"  {UNTIMED}")
     if cluster.time is not None and cluster.time < result.wall:
         print(f"  the time limit of {in_time(cluster.time)} ends before: go on with --resume, about "
               f"{counted(math.ceil(result.wall / cluster.time), 'time')} in all, or ask for more workers or more time")
@@ -168,7 +173,8 @@ def _predicted(plan: Plan, cluster: Cluster, folder: Path, formats: tuple[str, .
 
     begun = sum(os.times()[:4])
     plan = plan.tried()
-    workers, cores = cluster.workers or 1, cluster.cores or usable_cores()
+    on_gpu = plan.setting.device != "cpu"  # to which one thread of a worker hands chunks
+    workers, cores = (cluster.workers or 1) * (cluster.gpus or 1), 1 if on_gpu else cluster.cores or usable_cores()
     measured = measure(plan, folder, cores, formats, begun)
     if cluster.kind == "slurm":
         plan = fitted(plan, measured, workers, cores, cluster.time)
@@ -177,14 +183,20 @@ def _predicted(plan: Plan, cluster: Cluster, folder: Path, formats: tuple[str, .
 
 def _print_prediction(plan: Plan, measured: Measured, result: Prediction, cluster: Cluster) -> None:
     n = len(measured.alone)
-    print(f"{plan.name}: {result.count:,} motions for {counted(result.workers, 'worker')} of {counted(result.cores, 'core')}, "
-          f"predicted from {n} of them")
+    print(f"{plan.name}: {result.count:,} motions for {counted(result.workers, 'worker')} of "
+          f"{counted(result.cores, _what(plan))}, predicted from {n} of them")
     failed = f"; {100 * measured.failed:.0f} % of them failed" if measured.failed else ""
-    print(f"  a motion      {in_small(result.motion)} of a core, from motion to motion ± {in_small(result.spread)}{failed}")
     cost = f", cost {result.core / 3600 * cluster.price:.3g}" if cluster.price is not None else ""
-    print(f"  core hours    {result.core / 3600:.3g} ± {100 * result.error:.0f} %{cost}")
-    print(f"  wall time     {in_time(result.wall)}: {in_time(measured.start)} to begin, {in_time(result.merge)} to put the "
-          f"results together, {counted(result.files, 'chunk')} of {result.size:,}, {in_small(result.chunk)} each")
+    chunks = f"{counted(result.files, 'chunk')} of {result.size:,}"
+    if measured.timed:
+        print(f"  a motion      {in_small(result.motion)} of a {_what(plan)}, from motion to motion ± {in_small(result.spread)}"
+              f"{failed}")
+        print(f"  {f'{_what(plan)} hours':13} {result.core / 3600:.3g} ± {100 * result.error:.0f} %{cost}")
+        print(f"  wall time     {in_time(result.wall)}: {in_time(measured.start)} to begin, {in_time(result.merge)} to put the "
+              f"results together, {chunks}, {in_small(result.chunk)} each")
+    else:
+        print(f"  a motion      {in_small(float(measured.alone.mean()))} of a core of this machine{failed}; {UNTIMED}")
+        print(f"  wall time     that of the GPU, and {in_time(result.merge)} to put the results together, {chunks}")
     print(f"  disk          {_in_bytes(result.written)} at the most, {_in_bytes(result.result)} at the end; "
           f"{counted(result.files, 'file')} on the way")
     print(f"  memory        {_in_bytes(result.memory)} a worker")
@@ -195,6 +207,11 @@ def _print_limits(result: list[Limit], count: int) -> None:
     for limit in result[:LIMITS]:
         beyond = " (this sweep is beyond it)" if limit.motions <= count else ""
         print(f"    at {limit.motions:.2g}: {limit.what}; {limit.remedy}{beyond}")
+
+
+def _what(plan: Plan) -> str:
+    """What computes a motion."""
+    return "core" if plan.setting.device == "cpu" else "GPU"
 
 
 def in_small(seconds: float) -> str:

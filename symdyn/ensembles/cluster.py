@@ -14,6 +14,7 @@
     account = "ab0123"
     qos = "normal"
     nodes = 8                           # in place of workers and cores: whole nodes
+    gpus = 4                            # of each worker, or of each node, where the device is a GPU; default: 1
     lease = 120                         # s without a sign of life after which others take over what a worker has
     price = 0.03                        # of a core for an hour, for --dry-run
     address = "tcp://host:8786"         # with kind = "dask"
@@ -34,10 +35,10 @@ from symdyn.shown import shown
 KINDS = ("slurm", "dask", "folder")
 # Key -> kinds of clusters that take it.
 KEYS = {**dict.fromkeys(("kind", "workers", "cores", "price"), KINDS), **dict.fromkeys(("memory", "lease"), ("slurm", "folder")),
-        **dict.fromkeys(("time", "partition", "account", "qos", "nodes"), ("slurm",)), "address": ("dask",)}
+        **dict.fromkeys(("time", "partition", "account", "qos", "nodes", "gpus"), ("slurm",)), "address": ("dask",)}
 WHY = {"memory": "Dask's workers have theirs already", "lease": "Dask itself notices workers that are lost",
        "time": "only Slurm ends workers at a time", "address": "it is of Dask",
-       **dict.fromkeys(("partition", "account", "qos", "nodes"), "it is of Slurm")}
+       **dict.fromkeys(("partition", "account", "qos", "nodes", "gpus"), "it is of Slurm")}
 # Workers of one line.
 WORKERS = 16
 # Names of partitions and accounts stand in a script of the shell.
@@ -52,6 +53,7 @@ class Cluster:
     cores    of each worker; None: those of its node
     memory   of each worker, bytes;  time: after which a worker is ended, s;  price: of a core for an hour
     nodes    whole nodes are asked for, one for each worker
+    gpus     that each worker asks for, where the device is a GPU; None: one
     """
 
     kind: str
@@ -66,6 +68,7 @@ class Cluster:
     lease: float = LEASE
     price: float | None = None
     address: str | None = None
+    gpus: int | None = None
 
 
 def read_cluster(content: Mapping[str, Any], faults: list[str]) -> Cluster | None:
@@ -129,14 +132,14 @@ def _values(table: Mapping[str, Any], kind: str | None, faults: list[str]) -> di
 WANTED = {"lease": "a number of seconds from 1 on", "price": "a positive number", "memory": 'a size such as "4 GB"',
           "kind": f"one of {', '.join(KINDS)}", "address": 'an address such as "tcp://host:8786"',
           "time": 'a time such as "04:00:00" (hours, minutes, seconds) or "2-12:00:00" (with days)',
-          **dict.fromkeys(("workers", "cores", "nodes"), "a whole number from 1 on"),
+          **dict.fromkeys(("workers", "cores", "nodes", "gpus"), "a whole number from 1 on"),
           **dict.fromkeys(("partition", "account", "qos"), "a name of letters, digits and _ . , @ + -")}
 
 
 def _value(key: str, value: Any) -> Any:
     """The value of a key; None if it is not as it must be."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if key in ("workers", "cores", "nodes"):
+    if key in ("workers", "cores", "nodes", "gpus"):
         return value if number and isinstance(value, int) and value >= 1 else None
     if key in ("lease", "price"):
         return float(value) if number and (1 if key == "lease" else 1e-300) <= value < 1e300 else None

@@ -21,10 +21,12 @@ from symdyn.counting import counted
 from symdyn.ensembles.chunk import Chunk, Done, held_at_once, numbers_of, quiet, run_chunk
 from symdyn.ensembles.cluster import Cluster, in_time
 from symdyn.ensembles.exports import EXPORTS
-from symdyn.ensembles.plan import Plan
+from symdyn.ensembles.plan import Plan, demand_device
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import MOST, SOBOL_LIMIT
 from symdyn.ensembles.store import Store
+from symdyn.errors import MissingExtra
+from symdyn.runtime.gpu.device import NoDevice
 from symdyn.runtime.memory import available, in_bytes
 
 SAMPLES = 10
@@ -46,8 +48,8 @@ CONFIDENCE = 0.95
 class Measured:
     """What ten samples have shown.
 
-    alone       seconds of each motion by itself
-    motion      seconds of one core for a motion as the run computes it
+    alone       seconds of each motion by itself, on a core
+    motion      seconds of one core, or of a GPU, for a motion as the run computes it; NaN: on a GPU that this machine lacks
     serial      the part of the work in which threads of a worker wait for each other
     put, merge  seconds for a chunk and for a byte of it: to write it; to put it together with others, and to export it
     exported    bytes of other formats for a byte of ensemble.npz
@@ -64,6 +66,11 @@ class Measured:
     start: float
     memory: int
     failed: float
+
+    @property
+    def timed(self) -> bool:
+        """Whether what computes the run is on this machine, so that it could be measured."""
+        return not math.isnan(self.motion)
 
     def speedup(self, cores: int) -> float:
         """How many times the rate of one core so many cores of a worker have, by Amdahl's law."""
@@ -85,10 +92,11 @@ class Prediction:
 
     motion, spread     seconds of a core for a motion, and their standard deviation from motion to motion
     error              relative error of the sum over all motions, from the spread of ten
-    core, wall         seconds: of cores for all motions; until the results are there
+    core, wall         seconds: of cores or GPUs for all motions; until the results are there
     chunk              seconds for one chunk;  merge: to put all together
     written, result    bytes on the disk at the most, and at the end;  files: in the folder of chunks
     memory             bytes of a worker
+    Times of the run are NaN where it is not timed.
     """
 
     count: int
@@ -116,7 +124,7 @@ def measure(plan: Plan, folder: Path, cores: int, formats: tuple[str, ...], star
     """
     taken = _rows(plan)
     with quiet():
-        one_by_one = replace(plan.setting, vectors=False)
+        one_by_one = replace(plan.setting, vectors=False, device="cpu")
         alone, failures, spent = [], 0, 0.0
         run_chunk(Chunk(one_by_one, 0, 0, taken[:1]))  # what is done once in a process
         for k, row in enumerate(taken):
@@ -127,7 +135,7 @@ def measure(plan: Plan, folder: Path, cores: int, formats: tuple[str, ...], star
             if spent > PATIENCE:
                 break
         taken = taken[:len(alone)]
-        motion = _together(plan, taken, float(np.mean(alone)))
+        motion = _together(plan, taken, float(np.mean(alone))) if _is_here(plan) else math.nan
         serial = _serial(plan, taken, motion, cores)
         memory = resident()
         put, merge, exported = _disk(plan, folder, formats)
@@ -165,7 +173,7 @@ def fitted(plan: Plan, measured: Measured, workers: int, cores: int, time: float
         return plan
     count = plan.samples.count
     seconds = min(600.0, time / 10) if time else 600.0
-    most = int(seconds * measured.speedup(cores) / (measured.motion * cores))
+    most = int(seconds * measured.speedup(cores) / (measured.motion * cores)) if measured.timed else count
     size = min(plan.chunk_size(), max(1, most), -(-count // (4 * workers * cores)))
     return replace(plan, size=max(size, -(-count // COMFORTABLE)))
 
@@ -213,12 +221,15 @@ def limits(plan: Plan, measured: Measured, cluster: Cluster, folder: Path, worke
     add(f"a reader that takes a whole outcome into {available() / 1e9:.3g} GB of memory",
         lambda n: n * 8 * max((int(np.prod(s)) for s in plan.setting.shapes), default=1) <= available(),
         'write formats = ["parquet"] or ["zarr"], which are read in pieces')
-    if cluster.time:
+    if cluster.time and measured.timed:
         limit = cluster.time
         add(f"the time limit of {limit / 3600:.3g} h for one array of {workers} workers", lambda n: of(n).wall <= limit,
             "ask for more workers, or go on with --resume")
-        add("putting the results together within the time limit", lambda n: of(n).merge <= limit, "ask for more time")
-    add("a year", lambda n: of(n).wall <= 365 * 86400, "ask for more workers")
+    if cluster.time:
+        most = cluster.time
+        add("putting the results together within the time limit", lambda n: of(n).merge <= most, "ask for more time")
+    if measured.timed:
+        add("a year", lambda n: of(n).wall <= 365 * 86400, "ask for more workers")
     if plan.samples.sampling == "sobol":
         result.append(Limit("Sobol's sequence has no more points", SOBOL_LIMIT, "take latin_hypercube or random"))
     result.append(Limit(f"samples of {MOST / 1e12:.3g} TB, the most there may be", MOST // (8 * len(plan.samples.names)),
@@ -238,6 +249,15 @@ def resident() -> int:
     except OSError:
         return 0
     return next((1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0)
+
+
+def _is_here(plan: Plan) -> bool:
+    """Whether this machine has what computes the run."""
+    try:
+        demand_device(plan.setting)
+    except (NoDevice, MissingExtra):
+        return False
+    return True
 
 
 def _rows(plan: Plan) -> np.ndarray:

@@ -22,6 +22,22 @@ NOTICE = 60
 PATIENCE = 60.0
 
 
+# A worker for each GPU that Slurm gives the job, which are not all, or more than were asked for, on whole nodes.
+EACH_GPU = """\
+workers=
+trap 'kill $workers' TERM
+for gpu in $(echo "${{CUDA_VISIBLE_DEVICES:-0}}" | tr , ' '); do
+    CUDA_VISIBLE_DEVICES=$gpu {run} &
+    workers="$workers $!"
+done
+status=0
+for worker in $workers; do
+    wait "$worker" || status=$?
+done
+wait
+exit $status"""
+
+
 class SlurmFailed(SymdynError):
     """Slurm is not there, or rejects a job; the message has its own words."""
 
@@ -29,23 +45,25 @@ class SlurmFailed(SymdynError):
 def script(cluster: Cluster, name: str, folder: Path, command: Sequence[str], device: bool = False) -> str:
     """The text of the script for sbatch: each task of the array is a worker.
 
-    command   that a worker is started by; device: a worker needs a GPU
+    command   that a worker is started by; device: motions are computed on GPUs, of which each has a worker of its own
     """
     options = {"job-name": f"symdyn-{name}"[:60], "array": f"0-{(cluster.workers or 1) - 1}", "nodes": "1", "ntasks": "1",
                "cpus-per-task": None if cluster.nodes else str(cluster.cores or 1),
                "mem": None if cluster.memory is None else f"{math.ceil(cluster.memory / 2**20)}M",
                "time": None if cluster.time is None else _time(cluster.time), "partition": cluster.partition,
-               "account": cluster.account, "qos": cluster.qos, "gres": "gpu:1" if device else None,
+               "account": cluster.account, "qos": cluster.qos, "gres": f"gpu:{cluster.gpus or 1}" if device else None,
                "output": str(folder / LOGS / "%A_%a.txt"), "open-mode": "append", "signal": f"B:TERM@{NOTICE}"}
     lines = [f"#SBATCH --{key}={shlex.quote(value)}" for key, value in options.items() if value is not None]
     lines += ["#SBATCH --requeue", *["#SBATCH --exclusive"] * cluster.nodes]
-    cores = '"${SLURM_CPUS_ON_NODE:-1}"' if cluster.nodes else str(cluster.cores or 1)
+    jobs = '"${SLURM_CPUS_ON_NODE:-1}"' if cluster.nodes else str(cluster.cores or 1)
+    run = f'{shlex.join(command)} "$@"' if device else f'{shlex.join(command)} --jobs {jobs} "$@"'
+    start = EACH_GPU.format(run=run) if device and (cluster.nodes or cluster.gpus) else f"exec {run}"
     return "\n".join([
         "#!/bin/sh", f"# The workers of an ensemble. sbatch {SCRIPT} adds more of them, at any time.", *lines, "",
         "# Each worker has its own threads; numeric libraries would start more.",
         "export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 MKL_NUM_THREADS=1",
         "# A worker that receives the sign that its time ends gives back what it has claimed.",
-        f'exec {shlex.join(command)} --jobs {cores} "$@"', ""])
+        start, ""])
 
 
 def submit(folder: Path, text: str) -> str:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import signal
 import stat
+import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import symdyn as sd
 from symdyn.cli import main, sweep_on_cluster
 from symdyn.ensembles import prediction, run, slurm
 from symdyn.ensembles.claims import Claims
@@ -22,6 +26,7 @@ from symdyn.ensembles.cluster import Cluster, in_time, read_cluster
 from symdyn.ensembles.plan import plan
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.sweep_file import read_sweep
+from symdyn.errors import EnsembleStopped
 from symdyn.runtime.building.recall import recall
 
 SWEEP = """
@@ -65,6 +70,7 @@ def read(**content):
                   "account": "x_1", "qos": "q", "lease": 30, "price": 0.5}},
      Cluster("slurm", 4, 2, 1_500_000_000, 93784.0, "a-b", "x_1", "q", False, 30.0, 0.5)),
     ({"cluster": {"kind": "slurm", "nodes": 3}}, Cluster("slurm", 3, None, nodes=True)),
+    ({"cluster": {"kind": "slurm", "nodes": 3, "gpus": 4}}, Cluster("slurm", 3, None, nodes=True, gpus=4)),
 ])
 def test_lines_about_a_cluster(content, expected):
     assert read(**content) == (expected, [])
@@ -84,6 +90,7 @@ def test_lines_about_a_cluster(content, expected):
       "cluster.partition: does not go with dask: it is of Slurm; leave it out",
       "cluster.memory: does not go with dask: Dask's workers have theirs already; leave it out",
       "cluster.lease: does not go with dask: Dask itself notices workers that are lost; leave it out"]),
+    ({"cluster": {"kind": "folder", "gpus": 2}}, ["cluster.gpus: does not go with folder: it is of Slurm; leave it out"]),
     ({"cluster": {"kind": "slurm", "address": "tcp://a:1"}},
      ["cluster.address: does not go with slurm: it is of Dask; leave it out"]),
     # All that is wrong at once.
@@ -132,6 +139,9 @@ def test_faults_of_the_cluster_are_among_the_others(tmp_path, capsys):
     ("", ["--stay"], "--stay goes with --join"),
     ("", ["--count", "5"], "--count goes with --dry-run; for the run itself write the count into the file"),
     ("", ["--status"], "holds no ensemble: nothing has begun there yet"),
+    ("device = \"gpu\"", ["--jobs", "2"], "device: a GPU is asked for, but --jobs 2 is for cores; leave --jobs out, and start a "
+     "worker for each GPU by --join"),
+    ("cluster = {kind = \"slurm\", gpus = 2}", [], "cluster.gpus: motions are computed by cores; give the file the line device"),
 ])
 def test_a_command_that_contradicts_the_file_or_itself(tmp_path, capsys, monkeypatch, more, arguments, message):
     monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
@@ -171,10 +181,38 @@ def test_the_script_has_what_the_file_asks_for():
     for line in ("job-name=symdyn-swing", "array=0-7", "nodes=1", "ntasks=1", "cpus-per-task=4", "mem=2048M", "time=0-01:30:00",
                  "partition=batch", "account=me", "qos=fast", "output='/a b/logs/%A_%a.txt'", "requeue"):
         assert f"#SBATCH --{line}" in lines
-    whole = slurm.script(Cluster("slurm", 3, nodes=True), "swing", Path("/a"), ["symdyn"], device=True).splitlines()
-    assert "#SBATCH --exclusive" in whole and "#SBATCH --gres=gpu:1" in whole and "#SBATCH --array=0-2" in whole
+    whole = slurm.script(Cluster("slurm", 3, nodes=True), "swing", Path("/a"), ["symdyn"]).splitlines()
+    assert "#SBATCH --exclusive" in whole and "#SBATCH --array=0-2" in whole
     assert whole[-1] == 'exec symdyn --jobs "${SLURM_CPUS_ON_NODE:-1}" "$@"'
-    assert not [line for line in whole if "cpus-per-task" in line or "time=" in line]
+    assert not [line for line in whole if "cpus-per-task" in line or "time=" in line or "gres" in line]
+    one = slurm.script(Cluster("slurm", 3, 4), "swing", Path("/a"), ["symdyn"], device=True).splitlines()
+    assert "#SBATCH --gres=gpu:1" in one and one[-1] == 'exec symdyn "$@"'
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Slurm is of POSIX")
+@pytest.mark.parametrize(("cluster", "given", "used"), [
+    (Cluster("slurm", 2, nodes=True, gpus=4), "0,2,5,7", "0 2 5 7"), (Cluster("slurm", 2, nodes=True), None, "0"),
+    (Cluster("slurm", 2, 8, gpus=2), "3,1", "1 3")])
+def test_every_gpu_of_a_job_has_a_worker(tmp_path, cluster, given, used):
+    """Which all get the sign that the time is over, and whose failure is that of the job."""
+    worker = tmp_path / "worker"
+    worker.write_text("#!/bin/sh\ntrap 'echo ends > $1.ended; exit 130' TERM\n"
+                      'echo "$CUDA_VISIBLE_DEVICES" > "$1.$CUDA_VISIBLE_DEVICES"\n'
+                      'if [ "$2" = fails ]; then exit "$CUDA_VISIBLE_DEVICES"; fi\nsleep 30 & wait\n')
+    worker.chmod(stat.S_IRWXU)
+    text = slurm.script(cluster, "swing", tmp_path, [str(worker), str(tmp_path / "gpu")], device=True)
+    assert f"#SBATCH --gres=gpu:{cluster.gpus or 1}" in text.splitlines()
+    path = tmp_path / "slurm.sh"
+    path.write_text(text)
+    environment = {k: v for k, v in os.environ.items() if k != "CUDA_VISIBLE_DEVICES"}
+    environment |= {"CUDA_VISIBLE_DEVICES": given} if given else {}
+    job = subprocess.Popen(["sh", str(path)], env=environment)
+    for gpu in used.split():
+        waited(tmp_path / f"gpu.{gpu}")
+    job.terminate()
+    assert job.wait(20) in (130, 143) and (tmp_path / "gpu.ended").exists()
+    assert sorted(p.name for p in tmp_path.glob("gpu.[0-9]")) == [f"gpu.{gpu}" for gpu in used.split()]
+    assert subprocess.run(["sh", str(path), "fails"], env=environment, check=False).returncode in map(int, used.split())
 
 
 SBATCH = """#!{python}
@@ -328,6 +366,38 @@ def test_a_time_limit_that_is_too_short_for_all_is_no_fault(tmp_path, capsys, qu
     assert main(["sweep", path, "--output", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert "the time limit of 5 min ends before: go on with --resume, about 4 times in all, or ask for more workers" in said
+
+
+@pytest.mark.skipif(shutil.which("nvidia-smi") is not None, reason="there may be a GPU")
+def test_a_sweep_on_gpus_is_submitted_where_there_is_none(tmp_path, capsys, queue):
+    """What the worker lacks is found out by the worker."""
+    table = "[cluster]\nkind = \"slurm\"\nworkers = 1\ntime = 00:10:00\ngpus = 2\n"
+    path, out = write(tmp_path, "device = \"gpu\"", table, chunk=20), tmp_path / "out"
+    assert main(["sweep", path, "--output", str(out), "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "400 motions for 2 workers of 1 GPU, predicted from 10 of them" in said
+    assert "s of a core of this machine; times on a GPU are not predicted: this machine has none that answers" in said
+    assert "20 chunks of 20" in said and "nan" not in said and "a year" not in said and "time limit of" not in said, said
+    assert main(["sweep", path, "--output", str(out), "--no-picture"]) == 0
+    said = capsys.readouterr().out
+    assert "computes 400 samples in 20 chunks\n  times on a GPU are not predicted: this machine has none" in said, said
+    waited(queue / "2.done")
+    assert all("device='gpu' was asked for, but this machine has no CUDA device that answers" in log.read_text()
+               or "device='gpu' needs the package cuda-bindings" in log.read_text() for log in (out / "logs").iterdir())
+    assert len(list((out / "logs").iterdir())) == 2 and not (out / "chunks").exists()
+    assert main(["sweep", path, "--output", str(out), "--resume"]) == 0  # submits again
+    waited(queue / "4.done")
+
+
+@pytest.mark.skipif(shutil.which("nvidia-smi") is not None, reason="there may be a GPU")
+@pytest.mark.parametrize("path", [None, "new"])
+def test_a_machine_without_a_gpu_says_so_before_anything_is_written(tmp_path, path):
+    asked = {} if path is None else {"path": tmp_path / path}
+    with pytest.raises(sd.ArgumentError, match="device='gpu:1' was asked for, but this machine has no CUDA device that answers"):
+        sd.ensemble(recall("double_pendulum", {}), {"q1": [0.1, 0.2]}, (0, 0.1), device="gpu:1", **asked)
+    assert not list(tmp_path.iterdir())
+    with ThreadPoolExecutor(1) as pool, pytest.raises(EnsembleStopped, match="tried 3 times: NoDevice: double_pendulum: device="):
+        sd.ensemble(recall("double_pendulum", {}), {"q1": [0.1, 0.2]}, (0, 0.1), device="gpu:1", executor=pool)
 
 
 # -- what is predicted

@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,10 @@ import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.cli import main
 from symdyn.ensembles.sweep_file import read_sweep
-from symdyn.errors import ArgumentError, CompileError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.errors import ArgumentError, CompileError, EnsembleStopped, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.gpu import compiling
+from symdyn.runtime.gpu import compiling, device
 from symdyn.runtime.gpu.motions import Motions
 from symdyn.runtime.solutions.states_only import NOT_KEPT
 from tests.helpers import swept
@@ -266,6 +267,40 @@ def test_functions_get_what_is_known_on_a_device(host: HostDevice) -> None:
     assert not host.log
     wrong = sd.ensemble(module, drawn, (0, 1), {"it": lambda sol: sol.nothing}, device="gpu")
     assert "'StatesOnly' has no attribute 'nothing'" in wrong.failures()[0]["message"]
+
+
+def test_gpus_of_a_machine_share_a_folder(host: HostDevice, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[int] = []
+    monkeypatch.setattr(device, "open_device", lambda number, owner: opened.append(number) or host)
+    module, drawn = compiled("double_pendulum"), {"q1": np.linspace(-1, 1, 24)}
+
+    def computes(which: str, **more: Any) -> Any:
+        return sd.ensemble(module, drawn, (0, 1), ["end q1"], chunk=3, path=tmp_path / "a", device=which, **more)
+
+    def both() -> Any:
+        with ThreadPoolExecutor(2) as pool:
+            return [one.result() for one in [pool.submit(computes, which, shared=True) for which in ("gpu", "gpu:1")]]
+
+    first, second = both()
+    assert set(opened) == {0, 1} and first.count == second.count == 24
+    again = computes("gpu:2", resume=True)
+    assert again.n_resumed == 24 and 2 not in opened
+    assert np.array_equal(again["end q1"], sd.ensemble(module, drawn, (0, 1), ["end q1"])["end q1"])
+
+
+def test_what_a_device_lacks_is_not_computed_on_the_processor(host: HostDevice, tmp_path: Path) -> None:
+    """Without a word it would take a hundred times as long."""
+    module, drawn = compiled("double_pendulum"), {"q1": np.linspace(-1, 1, 24)}
+    host.memory = 3_000
+    with pytest.raises(EnsembleStopped, match=r"tried 3 times: NoDevice: double_pendulum: a processor has 3 kB .* ask for fewer"):
+        sd.ensemble(module, drawn, np.linspace(0, 1, 11), device="gpu")
+    host.memory = 2**30
+    kept: Any = host.launch
+    host.launch = lambda *given: (_ for _ in ()).throw(device.DeviceFailed("the CUDA driver's cuLaunchKernel failed"))  # type: ignore
+    with pytest.raises(EnsembleStopped, match="tried 3 times: DeviceFailed: the CUDA driver's cuLaunchKernel failed"):
+        sd.ensemble(module, drawn, (0, 1), device="gpu", path=tmp_path / "a")
+    host.launch = kept  # type: ignore[method-assign]
+    assert sd.ensemble(module, drawn, (0, 1), device="gpu", path=tmp_path / "a", resume=True).n_failed == 0
 
 
 # -- what a device does not take
