@@ -19,7 +19,6 @@ from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, MissingExtra, SimulationWarning, SymdynError
 from symdyn.runtime.batches.motions import IN_LANES, why_columns_one_by_one, why_one_by_one
 from symdyn.runtime.gpu.device import OfDevice
-from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import checked_tolerances
 from symdyn.runtime.module import Module
