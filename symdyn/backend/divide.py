@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from symdyn.tape.arrays import Arrays
 from symdyn.tape.node import Node
 from symdyn.tape.tape import unsigned
 
@@ -12,10 +15,11 @@ _SUMS = ("add", "sub")
 Stretch = tuple[list[Node], list[Node]]
 
 
-def divide(body: Sequence[Node], entries: Sequence[Any], longest: int, before: Mapping[Node, int] | None = None, count: int = 0,
-           later: Collection[Node] = ()) -> tuple[list[Stretch], dict[Node, int], int]:
+def divide(arrays: Arrays, body: Sequence[Node], entries: Sequence[Any], longest: int, before: Mapping[Node, int] | None = None,
+           count: int = 0, later: Collection[Node] = ()) -> tuple[list[Stretch], dict[Node, int], int]:
     """Stretches of `body`, each with the nodes that later ones or the entries need; the place of each such node; their number.
 
+    arrays   of the tape whose steps these are
     A stretch ends with a section where it can, and has at most `longest` steps. A place is used again once the last stretch
     that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
     others, `longest` by each.
@@ -24,7 +28,8 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int, before: M
     later    nodes that are read after the last stretch, so that their places are not used again
     """
     before = before or {}
-    stretches = stretches_of(products_next_to_their_sums(body, entries), longest)
+    order = products_next_to_their_sums(arrays, arrays.places(body), entries)
+    stretches = stretches_of([arrays.steps[k] for k in order.tolist()], longest)
     begin = len(stretches) - 1
     if len(entries) > longest:
         begin += 1
@@ -60,26 +65,22 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int, before: M
     return result, slots, count
 
 
-def products_next_to_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
-    """The steps with each product that only one sum needs just before that sum, so that both become one operation."""
-    alone: dict[Node, bool] = {}
-    for node in body:
-        summed = node.op in _SUMS
-        for a in node.args:
-            if isinstance(a, Node):
-                core = a.args[0] if a.op == "neg" else a
-                if core.op == "mul":
-                    alone[core] = summed and core not in alone
-    alone.update((core, False) for core in map(unsigned, entries) if isinstance(core, Node))
-    late = {node for node in body if node.op == "mul" and alone.get(node)}
-    ordered: list[Node] = []
-    for node in body:
-        if node in late:
-            continue
-        if node.op in _SUMS:
-            ordered += [core for core in map(unsigned, node.args) if core in late]
-        ordered.append(node)
-    return ordered
+def products_next_to_their_sums(arrays: Arrays, body: np.ndarray, entries: Sequence[Any]) -> np.ndarray:
+    """Places of steps, ascending, with each product that only one sum needs just before that sum, so that both become one
+    operation.
+
+    body   places of the steps that read others
+    """
+    inside = np.zeros(len(arrays.steps), dtype=bool)
+    inside[body] = True
+    alone = inside & arrays.does("mul") & (arrays.read_by(inside) == 1) & ~arrays.marked(map(unsigned, entries))
+    # Behind each step there is room for the two products that may come before the next one.
+    order = 3 * np.arange(len(arrays.steps))
+    reading = np.flatnonzero((inside & arrays.does(*_SUMS))[arrays.readers] & (arrays.cores >= 0))
+    reading = reading[alone[arrays.cores[reading]]]
+    reader = arrays.readers[reading]
+    order[arrays.cores[reading]] = 3 * reader - 2 + reading - arrays.begins[reader]
+    return body[np.argsort(order[body], kind="stable")]
 
 
 def stretches_of(body: Sequence[Node], longest: int) -> list[list[Node]]:

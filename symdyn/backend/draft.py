@@ -12,6 +12,7 @@ from symdyn.backend.divide import divide
 from symdyn.backend.function import ARGUMENTS, Function, Part
 from symdyn.backend.rolled import Rolled
 from symdyn.backend.writer import Writer, checks_of
+from symdyn.tape.arrays import Arrays
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape, count_of
 
@@ -25,6 +26,7 @@ class Draft:
     """A function before it is written.
 
     body     its steps; checks: what must be positive
+    arrays   of a tape that has these steps
     """
 
     name: str
@@ -32,6 +34,7 @@ class Draft:
     tape: Tape
     body: Sequence[Node]
     checks: Mapping[Node, str]
+    arrays: Arrays
 
     @property
     def output(self) -> Output:
@@ -75,7 +78,7 @@ class Drafts:
             taken = tape.steps if body is None else body
             body = [n for n in taken if n in running and n not in self.hoisted and n.op != "leaf"]
         checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in self.late), *dividing])
-        return Draft(name, title, tape, body, checks)
+        return Draft(name, title, tape, body, checks, tape.arrays)
 
     def looped(self, draft: Draft, least: int) -> Function | None:
         """The function with loops for what it repeats; None where they save fewer than so many statements."""
@@ -119,7 +122,7 @@ class Drafts:
         longest, entries = self.dialect.parts.longest, draft.output.entries
         done, wanted = beginning.done, self.inlined.get(draft.name)
         body = [node for node in draft.body if node not in done] if done else draft.body
-        stretches, slots, n_w = divide(body, entries, longest, beginning.slots, beginning.n_w, later)
+        stretches, slots, n_w = divide(draft.arrays, body, entries, longest, beginning.slots, beginning.n_w, later)
         storing = -(-len(entries) // longest)
         parts: list[Part] = []
         result: set[Node] = set()
@@ -164,7 +167,7 @@ class Drafts:
         checks = {node: reason for node, reason in first.checks.items() if all(node in d.checks for d in others)}
         title = f"{', '.join(d.name for d in drafts[:-1])} and {drafts[-1].name} have in common"
         tape = Tape(first.tape.recorder, {name: Output(name, (0,), ())})
-        parts, slots, n_w, inlined = self._parts(Draft(name, title, tape, steps, checks), before, later)
+        parts, slots, n_w, inlined = self._parts(Draft(name, title, tape, steps, checks, first.arrays), before, later)
         groups = {g for part in parts for g in part.arguments}
         return (Function(name, title, (0,), tuple(g for g in ARGUMENTS if g in groups), (), (), (), count_of(steps), 0,
                          tuple(parts), n_w, inlined=inlined), {node: slots[node] for node in later})

@@ -13,6 +13,8 @@ import numpy as np
 
 # Kinds of so many steps in a row are compared to find out after how many steps they come again.
 _IN_A_ROW = 8
+# Makes one number of these, which is the same by chance for a few others: what it finds is compared in full later.
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Lengths of stretches that are tried, the most frequent ones.
 _LENGTHS = 12
 # Trips of a loop and statements that it saves, at least.
@@ -59,12 +61,14 @@ def find_loops(kinds: np.ndarray, begins: Sequence[int] | np.ndarray) -> list[Lo
 
 def _since(kinds: np.ndarray) -> np.ndarray:
     """Of each step, after how many steps it comes again with the kinds of those behind it; 0: it comes for the first time."""
-    since = np.zeros(max(0, len(kinds) - _IN_A_ROW + 1), dtype=int)
-    last: dict[bytes, int] = {}
-    for k in range(len(since)):
-        key = kinds[k:k + _IN_A_ROW].tobytes()
-        since[k] = k - last.get(key, k)
-        last[key] = k
+    n = max(0, len(kinds) - _IN_A_ROW + 1)
+    keys = np.zeros(n, dtype=np.uint64)
+    for k in range(_IN_A_ROW):
+        keys = keys * _FACTOR + kinds[k:k + n].astype(np.uint64)
+    order = np.argsort(keys, kind="stable")
+    again = keys[order[1:]] == keys[order[:-1]]
+    since = np.zeros(n, dtype=int)
+    since[order[1:]] = np.where(again, np.diff(order), 0)
     return since
 
 

@@ -78,9 +78,10 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
         [*reasons, *checks_of(whole, whole.steps).values()]))}
     late = _late(whole, tapes, singular_fallback)
-    used = set(cores_of([a for n in (*whole.running, *late) for a in n.args]
-                      + [e for o in whole.outputs.values() for e in o.entries]))
-    constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
+    arrays = whole.arrays
+    used = arrays.read_by(arrays.running | arrays.marked(late)) > 0
+    used |= arrays.marked(unsigned(e) for o in whole.outputs.values() for e in o.entries)
+    constants = {node: k for k, node in enumerate(n for n in arrays.chosen(used & arrays.prologue) if n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
     inlined = {w.name: w.inlined for f in (*like.functions, *like.common) for w in f.ways} if like else {}
     drafts = Drafts(dialect, places, hoisted, codes, late, inlined)
@@ -170,8 +171,8 @@ def _either(name: str, title: str, regular: Function, singular_fallback: Functio
 def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str]]:
     """Numeric algorithms with their largest sizes, functions of the user, and the algorithms that are called with one size."""
     sizes: dict[str, set[tuple[int, ...]]] = {}
-    for node in tape.steps:
-        if node.op == "call" and not isinstance(node.args[0], UserFunction):
+    for node in tape.arrays.chosen(tape.arrays.does("call")):
+        if not isinstance(node.args[0], UserFunction):
             sizes.setdefault(node.args[0].name, set()).add(tuple(node.args[0].sizes))
     largest = {name: tuple(map(max, zip(*result, strict=True))) for name, result in sorted(sizes.items())}
     return largest, called(tape), frozenset(name for name, result in sizes.items() if len(result) == 1)

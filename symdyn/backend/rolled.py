@@ -28,8 +28,8 @@ from symdyn.tape.node import Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
-# Steps that are not repeated: numeric algorithms and their results.
-_ALONE = ("call", "item", "sines")
+# Steps of the tape that are not repeated: numeric algorithms and their results.
+_ALONE = ("call", "item")
 # What a step reads besides leaves and constants, which are named by their groups.
 _NUMBER, _STEP = "number", "step"
 # The arrays that these stand in; leaves and constants stand in those of their groups.
@@ -80,7 +80,7 @@ class _Kept(Mapping[Node, tuple[str, int]]):
         rolled = self.of
         if node in rolled.stored:
             return rolled.stored[node]
-        k = rolled.number.get(node, -1)
+        k = rolled.number(node)
         if k < 0 or rolled.groups[k] not in _ARRAYS or rolled.place[k] < 0 or self.first <= k < len(rolled.steps):
             raise KeyError(node)
         return "w", int(rolled.place[k])
@@ -113,7 +113,8 @@ class Rolled:
     stored   nodes that are read from an array: what the prologue computed -> (group, place)
     checks   of the whole function
     inlined  what is written where it is used; None: what is used once and short
-    read     what steps read: the steps, then all else; number: step or node -> its place there
+    at       of each step its place among those of the tape; -1: it stores or takes sines
+    read     what steps read: the steps, then all else
     groups   of each of these; place: where it stands in the array of its group, -1: nowhere
     """
 
@@ -124,10 +125,14 @@ class Rolled:
         self.dialect, self.tape, self.places, self.stored = dialect, tape, places, stored
         self.codes, self.checks = codes, checks
         self.body, self.entries, self.inlined = body, entries, inlined
+        self.arrays = tape.arrays
         self.at_once = taken_at_once(body, dialect)
         self.angles = list(dict.fromkeys(n.args[0] for n in self.at_once))
-        self.steps: list[Any] = self._in_order()
-        self.number: dict[Any, int] = {step: k for k, step in enumerate(self.steps)}
+        self.steps, self.at = self._in_order()
+        # Where the steps of the tape stand among what is read; the last one is that of numbers.
+        self._numbers = np.full(len(self.arrays.steps) + 1, -1)
+        self._numbers[self.at] = np.arange(len(self.steps))
+        self._numbers[-1] = -1
         self.read: list[Any] = list(self.steps)
         self.groups: list[str] = [_STEP] * len(self.steps)
         kinds = self._look()
@@ -148,69 +153,106 @@ class Rolled:
                   (a.kind == "array" and len(set(np.diff(self.place[a.numbers]).tolist())) > 1)}
         return sum(loop.saved for loop in self.loops) - sum(tables.values()) // _ENTRIES
 
-    def _in_order(self) -> list[_Step]:
-        """The steps: what sines and cosines need, these, then the rest; each result is stored as soon as it is there."""
-        computed = set(self.body).difference(self.at_once)
-        stores: dict[Node, list[_Step]] = {}
-        first: list[_Step] = []
+    def number(self, node: Node) -> int:
+        """The place of a node in what steps read; -1: none reads it."""
+        return int(self._numbers[self.arrays.place(node)])
+
+    def _in_order(self) -> tuple[list[_Step], np.ndarray]:
+        """The steps: what sines and cosines need, these, then the rest; each result is stored as soon as it is there. And their
+        places among those of the tape."""
+        arrays = self.arrays
+        body = arrays.places(self.body)
+        computed = np.zeros(len(arrays.steps), dtype=bool)
+        computed[body] = True
+        computed &= ~arrays.marked(self.at_once)
+        # In an order, the steps that are not the tape's stand as -1, -2, ...
+        others: list[_Step] = []
+        behind: dict[int, list[int]] = {}
+        first: list[int] = []
         for k, entry in enumerate(self.entries):
             core = unsigned(entry)
-            here = stores.setdefault(core, []) if isinstance(core, Node) and core in computed else first
-            here.append(_Store("store", k, entry))
-        needed = computed.intersection(reachable(self.angles))
-        ordered = [n for n in products_next_to_their_sums(self.body, self.entries) if n in computed]
+            place = arrays.place(core) if isinstance(core, Node) else -1
+            others.append(_Store("store", k, entry))
+            (behind.setdefault(place, []) if place >= 0 and computed[place] else first).append(-len(others))
 
-        def stored(nodes: Sequence[Node]) -> Iterator[_Step]:
-            for node in nodes:
-                yield node
-                yield from stores.get(node, ())
+        def stored(places: np.ndarray) -> np.ndarray:
+            steps = np.flatnonzero(np.isin(places, list(behind)))
+            stores = [behind[place] for place in places[steps].tolist()]
+            return np.insert(places, np.repeat(steps + 1, [len(s) for s in stores]), [k for s in stores for k in s])
 
-        taken: list[_Step] = [_Store("angle", k, angle) for k, angle in enumerate(self.angles)]
-        return [*stored([n for n in ordered if n in needed]), *taken, *[_Sines()] * bool(taken), *first,
-                *stored([n for n in ordered if n not in needed])]
+        order = products_next_to_their_sums(arrays, body, self.entries)
+        order = order[computed[order]]
+        needed = arrays.marked(reachable(self.angles))[order]
+        sines: list[_Step] = [_Store("angle", k, angle) for k, angle in enumerate(self.angles)]
+        others += [*sines, *[_Sines()] * bool(sines)]
+        taken = -1 - np.arange(len(self.entries), len(others))
+        order = np.concatenate([stored(order[needed]), taken, np.array(first, dtype=np.int64), stored(order[~needed])])
+        return [arrays.steps[k] if k >= 0 else others[-1 - k] for k in order.tolist()], np.maximum(order, -1)
 
     # -- what steps do, and what they read
 
     def _look(self) -> np.ndarray:
         """Number what the steps read; returns the kinds of steps."""
-        steps, number, names = self.steps, self.number, self.tape.recorder.names
+        steps, arrays, at = self.steps, self.arrays, self.at
+        recorded, alone = at >= 0, np.zeros(len(steps), dtype=bool)
+        others = np.flatnonzero(~recorded).tolist()
+        alone[recorded] = arrays.does(*_ALONE)[at[recorded]]
+        alone[others] = [isinstance(steps[k], _Sines) for k in others]
+        # All arguments, one step's after the other's; those of the tape's steps stand in its arrays.
+        sizes = np.zeros(len(steps), dtype=np.int64)
+        sizes[recorded] = np.diff(arrays.begins)[at[recorded]]
+        sizes[others] = [len(steps[k].args) for k in others]
+        reader = np.repeat(np.arange(len(steps)), sizes)
+        column = np.arange(len(reader)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+        there = recorded[reader]
+        source = np.full(len(reader), -1)
+        source[there] = arrays.begins[at[reader[there]]] + column[there]
+        kept = [value for k in others for value in steps[k].args]
+        cores, minus = np.full(len(reader), -1), np.zeros(len(reader), dtype=bool)
+        cores[there], minus[there] = arrays.cores[source[there]], arrays.minus[source[there]]
+        cores[~there] = arrays.places(map(unsigned, kept))
+        minus[~there] = [unsigned(value) is not value for value in kept]
+
+        read = self._among_read(cores)
+        constants: dict[Any, int] = {}
+        values = dict(zip(np.flatnonzero(~there).tolist(), kept, strict=True))
+        for k in np.flatnonzero((cores < 0) & ~alone[reader]).tolist():
+            value = values[k] if k in values else arrays.values[source[k]]
+            key = type(value), value
+            if key not in constants:
+                constants[key] = len(self.read)
+                self.read.append(value)
+                self.groups.append(_NUMBER)
+            read[k] = constants[key]
+        self.place = np.concatenate([self.place, np.full(len(constants), -1)])
+
+        together = ~alone[reader]
+        where = reader[together], column[together]
+        self.references = np.full((len(steps), 3), -1, dtype=np.int64)
+        self.references[where] = read[together]
+        kinds = np.zeros(len(steps), dtype=np.int64)
+        marks = 2 * arrays.marked(self.checks) + arrays.marked(self.tape.recorder.names)
+        kinds[recorded] = (4 * arrays.ops.astype(np.int64) + marks)[at[recorded]]
+        kinds[others] = 4 * (1 + int(arrays.ops.max(initial=0)) + _numbered([steps[k].op for k in others]))
+        taken = np.zeros((len(steps), 3), dtype=np.int64)
+        taken[where] = 1 + (2 * _numbered(self.groups)[read] + minus)[together]
+        for values_of in taken.T:
+            kinds = kinds * (1 + 2 * (len(ARGUMENTS) + len(_OTHERS))) + values_of
+        kinds[alone] = -1 - np.flatnonzero(alone)
+        return kinds
+
+    def _among_read(self, cores: np.ndarray) -> np.ndarray:
+        """The numbers of steps of the tape among what is read; those that are no steps of this function get one."""
         order = {angle: k for k, angle in enumerate(self.angles)}
         n = len(self.angles)
         sines = {node: (1 + (node.op == "cos")) * n + order[node.args[0]] for node in self.at_once}
-        index = [-1] * len(steps)
-        values = [a for step in steps for a in step.args]
-        minus = np.array([isinstance(a, Node) and a.op == "neg" for a in values], dtype=np.int64)
-        cores = [a.args[0] if isinstance(a, Node) and a.op == "neg" else a for a in values]
-        sizes = np.array([len(step.args) for step in steps], dtype=np.int64)
-        reader = np.repeat(np.arange(len(steps)), sizes)
-        alone = np.array([step.op in _ALONE for step in steps], dtype=bool)
-        read = np.array([number.get(core, -1) if isinstance(core, Node) else -1 for core in cores], dtype=np.int64)
-        for k in np.flatnonzero(read < 0).tolist():
-            core = cores[k]
-            if not isinstance(core, Node) and alone[reader[k]]:
-                continue
-            key = core if isinstance(core, Node) else (type(core), core)
-            if key not in number:
-                number[key] = len(self.read)
-                group, at = self._group(core, sines)
-                self.read.append(core)
-                self.groups.append(group)
-                index.append(at)
-            read[k] = number[key]
-        self.place = np.array(index, dtype=np.int64)
-
-        together = ~alone[reader]
-        where = reader[together], (np.arange(len(values)) - np.repeat(np.cumsum(sizes) - sizes, sizes))[together]
-        self.references = np.full((len(steps), 3), -1, dtype=np.int64)
-        self.references[where] = read[together]
-        kinds = _numbered([step.op for step in steps])
-        kinds = 4 * kinds + np.array([2 * (step in self.checks) + (step in names) for step in steps], dtype=np.int64)
-        taken = np.zeros((len(steps), 3), dtype=np.int64)
-        taken[where] = 1 + (2 * _numbered(self.groups)[read] + minus)[together]
-        for column in taken.T:
-            kinds = kinds * (1 + 2 * (len(ARGUMENTS) + len(_OTHERS))) + column
-        kinds[alone] = -1 - np.flatnonzero(alone)
-        return kinds
+        outside = [k for k in np.unique(cores[self._numbers[cores] < 0]).tolist() if k >= 0]
+        self._numbers[outside] = len(self.read) + np.arange(len(outside))
+        self.read += [self.arrays.steps[k] for k in outside]
+        groups = [self._group(self.arrays.steps[k], sines) for k in outside]
+        self.groups += [group for group, _ in groups]
+        self.place = np.array([*[-1] * len(self.steps), *(place for _, place in groups)], dtype=np.int64)
+        return self._numbers[cores]
 
     def _group(self, core: Any, sines: Mapping[Node, int]) -> tuple[str, int]:
         """The array that a value is read from, if it is not a step, and its place there."""
@@ -258,7 +300,7 @@ class Rolled:
         for first, end in self.apart:
             for step in self.steps[first:end]:
                 for core in cores_of(step.args):
-                    k = self.number.get(core, -1)
+                    k = self.number(core)
                     if 0 <= k < first:
                         needed[k] = True
         needed = needed[:len(self.steps)]
@@ -337,10 +379,10 @@ class Rolled:
                         self.inlined)
         nodes = [step for step in steps if isinstance(step, Node)]
         stores = [step for step in steps if isinstance(step, _Store)]
-        kept = [node for node in nodes if self.place[self.number[node]] >= 0]
+        kept = [node for node in nodes if self.place[self.number(node)] >= 0]
 
         def results() -> tuple[str, ...]:
-            lines = [self.stored_at("w", str(self.place[self.number[node]]), writer.printer.text(node)) for node in kept]
+            lines = [self.stored_at("w", str(self.place[self.number(node)]), writer.printer.text(node)) for node in kept]
             return (*lines, *(self.stored_at(s.op, str(s.k), writer.printer.text(s.value)) for s in stores))
 
         part = writer.part(nodes, [*kept, *(s.value for s in stores)], results, self.checks)

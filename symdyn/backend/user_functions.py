@@ -40,12 +40,11 @@ class UserText:
 def called(tape: Tape) -> tuple[UserFunction, ...]:
     """Functions that a tape calls, by name. Raises SymdynError for two that differ and have one name."""
     result: dict[str, UserFunction] = {}
-    for node in tape.steps:
-        if node.op == "call" and isinstance(node.args[0], UserFunction):
-            function = node.args[0]
-            if result.setdefault(function.label, function) != function:
-                raise SymdynError(f"two functions that differ are called {function.label}: {result[function.label].signature} "
-                                  f"and {function.signature}; give one of them another name")
+    for node in tape.arrays.chosen(tape.arrays.does("call")):
+        function = node.args[0]
+        if isinstance(function, UserFunction) and result.setdefault(function.label, function) != function:
+            raise SymdynError(f"two functions that differ are called {function.label}: {result[function.label].signature} "
+                              f"and {function.signature}; give one of them another name")
     return tuple(function for _, function in sorted(result.items()))
 
 

@@ -243,24 +243,28 @@ class Writer:
 
 def taken_at_once(body: Sequence[Node], dialect: Dialect) -> list[Node]:
     """The sines and cosines that need no other one, if the dialect takes so many of them all at once."""
+    least = None if dialect.sincos is None else dialect.sincos.least
+    asked = [node for node in body if node.op in ("sin", "cos")]
+    if least is None or len(asked) < least:
+        return []
+    needed = set(reachable(asked))
     chosen: list[Node] = []
     waiting: set[Node] = set()
     for node in body:
-        for a in node.args:
-            if isinstance(a, Node) and (a.args[0] if a.op == "neg" else a) in waiting:
-                waiting.add(node)
-                break
-        else:
-            if node.op in ("sin", "cos"):
-                chosen.append(node)
-                waiting.add(node)
-    return chosen if dialect.sincos is not None and len(chosen) >= dialect.sincos.least else []
+        if node not in needed:
+            continue
+        if not waiting.isdisjoint(cores_of(node.args)):
+            waiting.add(node)
+        elif node.op in ("sin", "cos"):
+            chosen.append(node)
+            waiting.add(node)
+    return chosen if len(chosen) >= least else []
 
 
 def checks_of(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
     """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
-    divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
-    divisors.update(n for n in steps if n.op in STOPPING)
+    asked = [n for n in steps if n.op == "div" or n.op in STOPPING]
+    divisors = {unsigned(n.args[1]) if n.op == "div" else n for n in asked}
     return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
 
 

@@ -8,10 +8,10 @@ of ten bodies.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
 from itertools import groupby
-from operator import attrgetter
 from typing import Any
+
+import numpy as np
 
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.passes import ARITHMETIC, rebuild
@@ -40,119 +40,148 @@ def balance(tape: Tape) -> Tape:
     return balanced
 
 
+class _Timed(Recorder):
+    """Also says when each node is ready, in `ready` by its index."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ready: list[int] = []
+
+    def _make(self, op: str, args: tuple, mask: int) -> Node:
+        node = super()._make(op, args, mask)
+        ready = self.ready
+        if node.index == len(ready):
+            time = 0
+            if mask & ~PARAMETER and op != "leaf":
+                for a in args:
+                    if isinstance(a, Node) and ready[a.index] > time:
+                        time = ready[a.index]
+                time += _LATENCY.get(op, _FUNCTION)
+            ready.append(time)
+        return node
+
+
 class _Balancer:
+    """Records the steps of a tape again.
+
+    outer   of each step, whether it is a sum of more than two terms, (n,)
+    inner   by its index, whether a node of the old tape is a sum within such a one; new: the value that it has become
+    """
+
     def __init__(self, tape: Tape) -> None:
         self.old = tape
-        self.recorder = Recorder()
-        self.new: dict[Node, Any] = {}
-        self.ready: dict[Node, int] = {}
-        self.inner = _inner_sums(tape)
+        self.recorder = _Timed()
+        arrays = self.arrays = tape.arrays
+        sums = _inner_sums(tape)
+        within = np.flatnonzero(arrays.cores >= 0)
+        outer = np.zeros(len(sums), dtype=bool)
+        outer[arrays.readers[within[sums[arrays.cores[within]]]]] = True
+        self.outer = outer & _free_sums(tape)
+        size = tape.steps[-1].index + 1 if tape.steps else 0
+        inner = np.zeros(size, dtype=bool)
+        inner[[step.index for step in arrays.steps]] = sums
+        self.inner: list[bool] = inner.tolist()
+        self.new: list[Any] = [None] * size
 
     def tape(self) -> Tape:
-        recorder, new, inner = self.recorder, self.new, self.inner
+        recorder, new, inner, arrays = self.recorder, self.new, self.inner, self.arrays
         ways = {op: getattr(recorder, op) for op in ARITHMETIC}
         names, checks = self.old.recorder.names, self.old.recorder.checks
-        for section, nodes in groupby(self.old.steps, key=attrgetter("section")):
+        marked = arrays.marked(names) | arrays.marked(checks)
+        places = zip(arrays.steps, self.outer.tolist(), marked.tolist(), strict=True)
+        for section, group in groupby(places, key=lambda place: place[0].section):
             with recorder.section(section):
-                for node in nodes:
+                for node, outer, noted in group:
                     op, args = node.op, node.args
-                    if (args[0] if op == "neg" else node) in inner:
+                    if inner[args[0].index if op == "neg" else node.index]:
                         continue
                     if op == "leaf":
                         value: Any = recorder.leaf(args[1], args[0])
-                    elif op in _SUMS and node.mask & ~PARAMETER and self._has_inner(args):
+                    elif outer:
                         value = self._sum(node)
                     else:
-                        again = [new[a] if isinstance(a, Node) else a for a in args]
+                        again = [new[a.index] if isinstance(a, Node) else a for a in args]
                         value = ways[op](*again) if op in ways else rebuild(recorder, op, tuple(again))
-                    new[node] = value
-                    if isinstance(value, Node):
+                    new[node.index] = value
+                    if noted and isinstance(value, Node):
                         if node in names:
                             recorder.name(names[node], value)
                         if node in checks and op == "guard":
                             recorder.positive(unsigned(value), checks[node])
                         elif node in checks:
-                            new[node] = recorder.positive(value, checks[node])
+                            new[node.index] = recorder.positive(value, checks[node])
         return Tape(recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
                                for name, o in self.old.outputs.items()})
 
     def _of(self, value: Any) -> Any:
-        return self.new[value] if isinstance(value, Node) else value
-
-    def _has_inner(self, terms: tuple[Any, ...]) -> bool:
-        """Whether a sum has more than its two terms, whose order is of no account."""
-        return any(unsigned(term) in self.inner for term in terms)
+        return self.new[value.index] if isinstance(value, Node) else value
 
     def _sum(self, node: Node) -> Any:
         """The terms, two by two, those that are ready first."""
-        r = self.recorder
-        heap = [(self._time(self._of(term)), k, sign, self._of(term)) for k, (sign, term) in enumerate(self._terms(node))]
+        r, ready = self.recorder, self.recorder.ready
+        heap = self._terms(node)
         heapq.heapify(heap)
         count = len(heap)
+        # The sign of a node is taken to that of its term, and the node that was recorded first stands first in a difference: it
+        # would be recorded so with a sign that moves outwards again. With numbers among the terms, signs stay where they are.
+        nodes_only = all(isinstance(term, Node) for *_, term in heap)
         while len(heap) > 1:
             (_, _, sign_a, a), (_, _, sign_b, b) = heapq.heappop(heap), heapq.heappop(heap)
+            if nodes_only:
+                sign_a, a = (-sign_a, a.args[0]) if a.op == "neg" else (sign_a, a)
+                sign_b, b = (-sign_b, b.args[0]) if b.op == "neg" else (sign_b, b)
             if sign_a == sign_b:
                 sign, total = sign_a, r.add(a, b)
+            elif nodes_only and a.index > b.index:
+                sign, total = sign_b, r.sub(b, a)
+            elif nodes_only:
+                sign, total = sign_a, r.sub(a, b)
             else:
                 sign, total = 1, r.sub(a, b) if sign_a > 0 else r.sub(b, a)
             count += 1
-            heapq.heappush(heap, (self._time(total), count, sign, total))
+            time = 0
+            if isinstance(total, Node):
+                time = ready[total.index]
+            else:
+                nodes_only = False
+            heapq.heappush(heap, (time, count, sign, total))
         _, _, sign, total = heap[0]
         return total if sign > 0 else r.neg(total)
 
-    def _terms(self, node: Node) -> Iterator[tuple[int, Any]]:
-        """Signs and terms in their order; without recursion, as a sum over all links of a long chain is that deep."""
+    def _terms(self, node: Node) -> list[tuple[int, int, int, Any]]:
+        """When each term is ready, its number in their order, its sign, and the term.
+
+        Without recursion, as a sum over all links of a long chain is that deep.
+        """
+        inner, new, ready = self.inner, self.new, self.recorder.ready
+        result: list[tuple[int, int, int, Any]] = []
         waiting: list[tuple[int, Any]] = [(1, node)]
         while waiting:
             sign, value = waiting.pop()
-            core = unsigned(value)
-            sign = -sign if core is not value else sign
-            if core is node or core in self.inner:
-                first, second = core.args
-                waiting += (sign if core.op == "add" else -sign, second), (sign, first)
-            else:
-                yield sign, core
-
-    def _time(self, value: Any) -> int:
-        """When a value is ready."""
-        if not isinstance(value, Node):
-            return 0
-        ready = self.ready
-        known = ready.get(value)
-        if known is not None:
-            return known
-        stack = [value]
-        while stack:
-            node = stack[-1]
-            if node.op == "leaf" or not node.mask & ~PARAMETER:
-                ready[stack.pop()] = 0
-                continue
-            waiting, before = False, 0
-            for a in node.args:
-                if isinstance(a, Node):
-                    time = ready.get(a)
-                    if time is None:
-                        waiting = True
-                        stack.append(a)
-                    elif time > before:
-                        before = time
-            if not waiting:
-                ready[stack.pop()] = before + _LATENCY.get(node.op, _FUNCTION)
-        return ready[value]
+            time = 0
+            if isinstance(value, Node):
+                if value.op == "neg":
+                    sign, value = -sign, value.args[0]
+                if value is node or inner[value.index]:
+                    first, second = value.args
+                    waiting += (sign if value.op == "add" else -sign, second), (sign, first)
+                    continue
+                value = new[value.index]
+                if isinstance(value, Node):
+                    time = ready[value.index]
+            result.append((time, len(result), sign, value))
+        return result
 
 
-def _inner_sums(tape: Tape) -> set[Node]:
-    """Sums that are used once, by another sum, and have neither a name nor a check: their order is free."""
-    once: dict[Node, bool] = {}
-    for node in tape.steps:
-        if node.op != "neg":
-            free = node.op in _SUMS and bool(node.mask & ~PARAMETER)
-            for a in node.args:
-                if isinstance(a, Node):
-                    core = a.args[0] if a.op == "neg" else a
-                    if core.op in _SUMS:
-                        once[core] = free and core not in once
-    names, checks = tape.recorder.names, tape.recorder.checks
-    results = {unsigned(e) for o in tape.outputs.values() for e in o.entries}
-    return {node for node, free in once.items() if free and node.mask & ~PARAMETER and node not in names
-            and node not in checks and node not in results}
+def _free_sums(tape: Tape) -> np.ndarray:
+    """Which steps are sums whose terms may be taken in any order, (n,)."""
+    return tape.arrays.does(*_SUMS) & (tape.arrays.masks & ~PARAMETER != 0)
+
+
+def _inner_sums(tape: Tape) -> np.ndarray:
+    """Which steps are sums that are used once, by another sum, and have neither a name nor a check: their order is free, (n,)."""
+    arrays, free = tape.arrays, _free_sums(tape)
+    results = [unsigned(e) for o in tape.outputs.values() for e in o.entries]
+    kept = arrays.marked([*tape.recorder.names, *tape.recorder.checks, *results])
+    used = arrays.read_by(~arrays.does("neg"))
+    return free & ~kept & (used == 1) & (arrays.read_by(free) == 1)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.tape.arrays import Arrays
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
@@ -80,6 +81,11 @@ class Tape:
         return reachable(entry for output in self.outputs.values() for entry in output.entries)
 
     @cached_property
+    def arrays(self) -> Arrays:
+        """The steps as arrays."""
+        return Arrays(self.steps)
+
+    @cached_property
     def inputs(self) -> tuple[Node, ...]:
         """The leaves that occur."""
         return tuple([node for node in self.steps if node.op == "leaf"])
@@ -87,12 +93,12 @@ class Tape:
     @cached_property
     def running(self) -> tuple[Node, ...]:
         """Steps that must be evaluated at every state: those that depend on more than parameters."""
-        return tuple([n for n in self.steps if n.mask & ~PARAMETER and n.op not in ("leaf", "neg")])
+        return self.arrays.chosen(self.arrays.running)
 
     @cached_property
     def prologue(self) -> tuple[Node, ...]:
         """Steps that depend on parameters only; they run once per simulation."""
-        return tuple([n for n in self.steps if n.mask == PARAMETER and n.op not in ("leaf", "neg")])
+        return self.arrays.chosen(self.arrays.prologue)
 
     @cached_property
     def hoisted(self) -> tuple[Node, ...]:
@@ -128,16 +134,16 @@ class Tape:
 
     def longest_chain(self) -> int:
         """Length of the longest chain of running operations that wait for each other."""
-        depth: dict[Node, int] = {}
-        known = depth.get
-        for node in self.steps:
-            if node.mask & ~PARAMETER and node.op != "leaf":
-                below = 0
-                for a in node.args:
-                    if isinstance(a, Node):
-                        below = max(below, known(a, 0))
-                depth[node] = below + (node.op != "neg")
-        return max(depth.values(), default=0)
+        arrays = self.arrays
+        begins, cores = arrays.begins.tolist(), arrays.cores.tolist()
+        depth = [0] * (len(self.steps) + 1)  # the last one is that of numbers
+        for k in np.flatnonzero(arrays.running).tolist():
+            below = 0
+            for core in cores[begins[k]:begins[k + 1]]:
+                if depth[core] > below:
+                    below = depth[core]
+            depth[k] = below + 1
+        return max(depth)
 
 
 def unsigned(value: Any) -> Any:

@@ -17,7 +17,7 @@ from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape import Recorder
 from symdyn.tape.node import COORDINATE
-from symdyn.tape.tape import unsigned
+from symdyn.tape.tape import Tape, unsigned
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -89,7 +89,7 @@ def test_stretches_hand_on_what_is_needed_and_no_more() -> None:
     tape = sd.systems.get("spatial_chain", n=5).recursive().tape("rhs")
     entries = tape.outputs["rhs"].entries
     body = list(tape.running)
-    stretches, slots, count = divide(body, entries, 60)
+    stretches, slots, count = divide(tape.arrays, body, entries, 60)
     assert sorted(n.index for stretch, _ in stretches for n in stretch) == [n.index for n in body]
     assert all(len(stretch) <= 60 + 2 for stretch, _ in stretches) and count < len(slots)
     held: dict[int, Any] = {}
@@ -115,7 +115,7 @@ def test_functions_are_divided_between_sections_where_parts_are_long_enough() ->
             for _ in range(6):
                 node = recorder.sin(node)
                 body.append(node)
-    stretches, _, _ = divide(body, [node], 8)
+    stretches, _, _ = divide(Tape.of(recorder, y=[node]).arrays, body, [node], 8)
     assert [[each.section for each in stretch] for stretch, _ in stretches] == [["first"] * 6, ["second"] * 6]
 
 

@@ -1,0 +1,54 @@
+"""Steps as arrays say what a loop over them says."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.tape import Recorder, Tape
+from symdyn.tape.arrays import Arrays
+from symdyn.tape.node import COORDINATE, PARAMETER, Node
+from symdyn.tape.tape import unsigned
+
+
+def test_a_step_reads_others_with_and_without_a_sign() -> None:
+    """Numbers have no place, and neither has what the outputs do not reach."""
+    r = Recorder()
+    a, b, unused = (r.leaf(name, COORDINATE) for name in "abu")
+    product, twice = a * b, 2 * a
+    quotient = -product / twice
+    arrays = Arrays(Tape.of(r, y=[quotient - product, r.sin(quotient)]).steps)
+    place = arrays.place
+    assert [place(n) for n in (a, b, product, twice)] == [0, 1, 2, 3] and place(unused) == -1
+    assert arrays.places([b, 3, None, unused, product]).tolist() == [1, -1, -1, -1, 2]
+    assert arrays.place(r.cos(b)) == -1  # recorded later than all of these
+    assert arrays.marked([product, 7, unused]).tolist() == [n is product for n in arrays.steps]
+    assert arrays.chosen(arrays.does("mul", "div")) == (product, twice, unsigned(quotient))
+    everything = np.ones(len(arrays.steps), dtype=bool)
+    assert arrays.read_by(~arrays.does("neg"))[place(product)] == 2
+    assert arrays.read_by(everything)[place(twice)] == 1
+    assert not arrays.read_by(~everything).any()
+
+
+@pytest.mark.parametrize("name", ["pendulum", "spatial_chain", "four_bar", "bicycle"])
+def test_arrays_agree_with_the_nodes(name: str) -> None:
+    tape = sd.systems.get(name).equations().tape("rhs")
+    arrays, steps = tape.arrays, tape.steps
+    flat = [(k, a) for k, node in enumerate(steps) for a in node.args]
+    assert arrays.readers.tolist() == [k for k, _ in flat] and arrays.values == [a for _, a in flat]
+    cores = [unsigned(a) for _, a in flat]
+    assert [steps[c] if c >= 0 else None for c in arrays.cores.tolist()] == [c if isinstance(c, Node) else None for c in cores]
+    assert arrays.minus.tolist() == [core is not a for core, (_, a) in zip(cores, flat, strict=True)]
+    assert tape.running == tuple(n for n in steps if n.mask & ~PARAMETER and n.op not in ("leaf", "neg"))
+    assert tape.prologue == tuple(n for n in steps if n.mask == PARAMETER and n.op not in ("leaf", "neg"))
+    uses = Counter(unsigned(a) for n in tape.running for a in n.args if isinstance(a, Node))
+    assert arrays.read_by(arrays.running).tolist() == [uses[n] for n in steps]
+
+
+def test_a_tape_of_numbers_has_no_steps() -> None:
+    tape = Tape.of(Recorder(), y=[1, 2])
+    assert tape.arrays.steps == () and tape.running == () and tape.longest_chain() == 0
+    assert tape.arrays.places([1, 2]).tolist() == [-1, -1]
