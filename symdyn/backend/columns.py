@@ -126,9 +126,9 @@ class MotionColumns(Columns):
     """A right-hand side with sensitivities: x_dot, then its derivatives along n columns.
 
     tape     with one output: x_dot, and its derivative along a direction
-    groups   one: the direction of x, then of inputs that are held and of what columns are by
-    held     of the former the number
-    by       for each column the seed, of the latter, that is 1; None: none
+    groups   one group, z: the direction of x, then of inputs that are held and of what columns are by
+    held     number of inputs that are held
+    by       for each column the index of the seed that is 1, among those of `groups` after the held ones; None: none
     """
 
     held: int

@@ -44,7 +44,7 @@ class Function:
     shape       of its result; loads, sections, results: statements in the dialect
     parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
     calls       functions that it calls before its own parts, which leave in w what it has in common with others
-    regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
+    regular, singular_fallback   for a function that is tried in one way and, where that fails, done in another: both, in place of
                 statements of its own
     written     statements that stand in the code where loops repeat some; steps: those that run
     inlined     steps that are written where they are used: which products and sums become one depends on it

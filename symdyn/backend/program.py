@@ -64,7 +64,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     """Write every tape (function name -> tape with one output) in the dialect.
 
     places      leaf name -> (group, place in it)
-    otherwise   function name -> the tape for where the first one fails
+    singular_fallback   function name -> the tape for where the first one fails
     like        the same in another dialect, whose rounding this one is to have
     columns     Jacobians whose tapes are derivatives along directions; vectors: the dialect of these
     rolled      whether what functions repeat becomes loops: "auto" where that saves LEAST_SAVED statements, True wherever it can

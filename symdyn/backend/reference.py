@@ -90,7 +90,7 @@ def make_reference(tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]
     Parameters are at their defaults (those without in [0.5, 1.5]) at the first state, varied at the others.
 
     groups      leaf names in the groups q, u, z, ud, inputs, p
-    otherwise   function name -> the tape for states where a check of the first one fails
+    singular_fallback   function name -> the tape for states where a check of the first one fails
     samples     random states at which all functions are evaluated
     The tolerance of a result is 1e-12, or the power of ten above twenty times what the same tape loses in double precision, if
     that is more; a result that loses all digits is left out.

@@ -67,7 +67,7 @@ class Content:
     groups   names in the groups q, u, z, ud, inputs, p, in order; units: name -> unit; defaults: name -> number
     outputs  user outputs: (name, shape) in the order of the function `outputs`
     unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
-    otherwise     tapes by function name for where the first ones fail
+    singular_fallback   tapes by function name for where the first ones fail
     events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
     columns       of sensitivities, which are the last entries of z; carried: weights that are carried back besides those of x

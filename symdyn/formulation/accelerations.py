@@ -37,7 +37,7 @@ class Motion:
     accelerations has its own `solver` and `accelerations`.
     remarks    speed -> what else to say where the mass matrix is singular along it
     rows       of constraints
-    lockable   places of the speeds whose pivot of the mass matrix vanishes at some positions (see locking)
+    vanishing_pivots   indices of the speeds whose pivot of the mass matrix vanishes at some positions (see that probe)
     """
 
     rows: Sequence[Any] = ()
@@ -98,7 +98,7 @@ class Motion:
         return [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
 
     def sizes_of_pivots(self) -> Mapping[int, Any]:
-        """What pivots of lockable speeds are compared with; those left out with their diagonal entries."""
+        """Reference sizes of vanishing pivots by index; those left out are compared with their diagonal entries."""
         return {}
 
     def solver(self) -> Solver:

@@ -72,7 +72,7 @@ class Equations(EquationsFacade):
     candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
     constraints  names of the constraint rows; holonomic: whether each holds positions; bodies: names
     joints       of those in `reactions`: name, parent, child, kind
-    otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
+    singular_fallback   the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
     surroundings what contacts touch and how mooring lines hang, likewise: their entries come after those of `drawn`
     down         direction of gravity, zero where there is none

@@ -37,7 +37,7 @@ class Along:
 
     solution   at STATES times; t (n_t,): these and those of closer looks at the worst places
     curves     label -> (n_t,); the last is of what accelerations come from
-    places     the worst of it, further peaks, passes of gimbal lock
+    passages   the worst of it, further peaks, passes of gimbal lock
     warnings   warnings of the run, and why it stopped early
     """
 

@@ -19,7 +19,7 @@ class Operation:
 
     kind       what it counts as: add, mul, div, sqrt, trig, function, compare, intrinsic (see symdyn.tape.intrinsics) or free
     partials   (recorder, result, arguments) -> derivative by each argument; None where it is zero everywhere
-    name       its name in NumPy's and mpmath's vocabulary (`numpy`, `mpmath`) and SymPy's (`sympy`)
+    numpy, mpmath, sympy   its name in the vocabulary of each
     """
 
     kind: str

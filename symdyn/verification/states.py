@@ -72,7 +72,6 @@ class _Manifold:
 
     newton   C (n_c,), its derivative by unit speeds J, C_scale, N, length, of which those of velocity constraints are zero
     speeds   C_dot (n_c,) and its derivative by the speeds
-    rank     the largest found
     """
 
     equations: Equations

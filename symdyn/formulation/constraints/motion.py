@@ -40,7 +40,7 @@ class Constrained(Motion):
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows
     pivots        (row, column) of C_r in the order in which dependent speeds are eliminated; None: by the Schur complement
-    locking       speeds without which others move all that they move at some positions, and these others (see locking)
+    massless_pivots   first speed of a motion without kinetic energy at some positions -> the other speeds of this motion
     unheld        what it means if the numeric algorithm fails
     """
 

@@ -32,7 +32,7 @@ class NullSpaceSolver:
     pivots   (row, column) of C in the order of elimination; names: of the rows
     least    squares of what the rows are compared with where they are small as a whole, (m,); default 0
     columns  factors by which columns in other units compare, (n,); default 1
-    locking  speeds without which others move what they move at some positions, and these others (see locking)
+    massless_pivots   first speed of a motion without kinetic energy at some positions -> the other speeds of this motion
     """
 
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],

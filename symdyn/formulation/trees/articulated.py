@@ -51,7 +51,7 @@ class Articulated:
 
     reasons   index of each joint speed that accelerates freely (the others follow given functions of time) -> what it
               means if its pivot is not positive
-    lockable  those of these indices whose pivot vanishes at some positions (see locking)
+    vanishing_pivots   those of these indices whose pivot vanishes at some positions (see that probe)
     pivots    (index, pivot) of these speeds
     """
 

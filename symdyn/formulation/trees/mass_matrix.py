@@ -45,8 +45,7 @@ def mass_matrix(tree: Tree) -> np.ndarray:
 
 
 def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
-    """What the pivots of lockable speeds are compared with whose own link has no mass along them, so that the diagonal entry may
-    be rounding, too."""
+    """Reference sizes of vanishing pivots whose own link has no mass along the speed: their diagonal may be rounding, too."""
     unfelt = [(i, column, index) for i, link in enumerate(tree.links) for column, index in enumerate(link.speeds)
               if tree.plain and index in tree.vanishing_pivots and not felt(tree, i, link.S[:, column])]
     if not unfelt:
