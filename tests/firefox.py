@@ -23,12 +23,12 @@ PREFERENCES = {
     "webgl.force-enabled": True, "webgl.disabled": False, "app.update.enabled": False, "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False, "browser.startup.page": 0, "browser.aboutwelcome.enabled": False,
     "network.captive-portal-service.enabled": False, "network.connectivity-service.enabled": False}
-# What the console has of the page, and the requests that WATCH has seen.
+# What the console has of the page, and the requests that OBSERVE has seen.
 SAID = """return [...Services.console.getMessageArray().filter(
     m => m instanceof Ci.nsIScriptError && m.sourceName.startsWith(arguments[0])).map(m => m.errorMessage),
     ...window.symdynAsked.splice(0)];"""
 # Requests of all pages from now on, but for those of Firefox itself: of documents with a principal of their own.
-WATCH = """Services.console.reset();
+OBSERVE = """Services.console.reset();
 Services.prefs.setIntPref("layout.css.prefers-color-scheme.content-override", arguments[0]);
 if (!window.symdynAsked) {
     window.symdynAsked = [];
@@ -81,7 +81,7 @@ class FirefoxPage:
         self._run = run
         self._address = ""
         with self._inside():
-            self._of_browser(WATCH, 0 if color_scheme == "dark" else 1)
+            self._of_browser(OBSERVE, 0 if color_scheme == "dark" else 1)
         run("WebDriver:SetWindowRect", width=viewport["width"], height=viewport["height"])
         wide, high = self.evaluate("[outerWidth - innerWidth, outerHeight - innerHeight]")
         run("WebDriver:SetWindowRect", width=viewport["width"] + wide, height=viewport["height"] + high)

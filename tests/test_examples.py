@@ -24,7 +24,7 @@ from symdyn.runtime.solutions.solution import Solution
 REFERENCE = Path(__file__).parents[1] / "docs" / "reference"
 ENTRY = re.compile(r"^\.\. auto(\w+):: (\S+)\n((?: +:\S.*\n?)*)", re.MULTILINE)
 # Members without an underscore that other parts of symdyn call, and that the reference leaves out.
-LEFT_OUT = {"Convention.faults", "Equations.watched", "Fit.of", "Module.following", "Module.motions_at", "Module.library",
+LEFT_OUT = {"Convention.faults", "Equations.validity_checks", "Fit.of", "Module.following", "Module.motions_at", "Module.library",
             "Samples.record", "Solution.input_slopes", "Table.beyond", "Table.pieces"}
 
 

@@ -18,7 +18,7 @@ import pytest
 
 import symdyn as sd
 from tests.checks import public_names, walk
-from tests.checks.every_page import Watched
+from tests.checks.every_page import CheckedPage
 from tests.helpers import CONTRAST, swept
 from tests.test_examples import PUBLIC
 
@@ -104,9 +104,9 @@ def test_docstrings_are_typeset(site: Path) -> None:
 def test_pages_work_without_a_network(there: Path, chromium: Any) -> None:
     """No request beyond the disk, nothing on the console, nothing wider than its box or the window; tests/checks/every_page.py
     opens all of them."""
-    watched = Watched(chromium)
-    assert [*watched.open(there), *watched.wider()] == []
-    watched.page.close()
+    checked = CheckedPage(chromium)
+    assert [*checked.open(there), *checked.wider()] == []
+    checked.page.close()
 
 
 def test_faults_of_pages_are_found(chromium: Any, tmp_path: Path) -> None:
@@ -119,16 +119,16 @@ def test_faults_of_pages_are_found(chromium: Any, tmp_path: Path) -> None:
         <div style="overflow: auto; width: 200px"><pre style="width: 900px">scrolls</pre></div>
         <div style="width: 1300px; height: 9px; position: absolute"></div><a href="#">plain</a>
         <button onfocus="this.blur()" id="shy">shy</button></div><script>console.log("talk")</script>""", encoding="utf-8")
-    watched = Watched(chromium)
-    opened = list(watched.open(page))
+    checked = CheckedPage(chromium)
+    opened = list(checked.open(page))
     assert opened[0] == "requested: http://127.0.0.1:8099/x.png" and "on the console: talk" in opened
-    wider = list(watched.wider())
+    wider = list(checked.wider())
     assert {one.rpartition(": ")[2] for one in wider if "1400 pixels" in one} == {"broad", "incomprehensible", ""}
     assert "wider than a window of 400 pixels" in wider and "wider than a window of 1400 pixels" not in wider
-    assert [one.split()[-2] for one in watched.unreadable()] == ["grey", "grey"]
-    assert list(watched.unreached()) == ['not reached by Tab: <button onfocus="this.blur()" id="shy">shy</button>',
+    assert [one.split()[-2] for one in checked.unreadable()] == ["grey", "grey"]
+    assert list(checked.unreached()) == ['not reached by Tab: <button onfocus="this.blur()" id="shy">shy</button>',
                                          'without an outline: <a href="#">plain</a>']
-    watched.page.close()
+    checked.page.close()
 
 
 @pytest.mark.every_value
@@ -161,10 +161,10 @@ def test_text_that_cannot_be_read_is_found(chromium: Any) -> None:
                                         "tutorials/robot_arm_from_urdf"], "index", "gallery/pendulum"))
 def test_the_keyboard_reaches_everything(site: Path, chromium: Any, name: str) -> None:
     """Tab goes to every link, button and field of a page that is seen, in a cycle, and each has an outline then."""
-    watched = Watched(chromium)
-    watched.page.goto((site / f"{name}.html").as_uri())
-    assert list(watched.unreached()) == [] and watched.page.evaluate("reached.size") > 20
-    watched.page.close()
+    checked = CheckedPage(chromium)
+    checked.page.goto((site / f"{name}.html").as_uri())
+    assert list(checked.unreached()) == [] and checked.page.evaluate("reached.size") > 20
+    checked.page.close()
 
 
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.sweep)])

@@ -205,7 +205,7 @@ class ModuleMetadata(Metadata):
     implicit_loads, of_reactions   what loads depend on accelerations and multipliers, on reactions
     motions       inputs whose rates and accelerations are inputs, too
     events, event_leaves   see EventRecord; entries of [t; x; inputs] whose ranges bound events
-    charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
+    charts, validity_checks   see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
     surroundings           what contacts touch and how mooring lines hang, likewise
     connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force", "line",
@@ -234,7 +234,7 @@ class ModuleMetadata(Metadata):
     events: tuple[EventRecord, ...] = ()
     event_leaves: tuple[int, ...] = ()
     charts: tuple[Chart, ...] = ()
-    watches: tuple[ValidityRange, ...] = ()
+    validity_checks: tuple[ValidityRange, ...] = ()
     switches: tuple[JumpRecord, ...] = ()
     not_smooth: str = ""
     drawn: tuple[Mapping[str, Any], ...] = ()

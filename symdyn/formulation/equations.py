@@ -79,7 +79,7 @@ class Equations(EquationsFacade):
     connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force, line, rope)
     acting       forces and torques of loads on bodies, in the order of the quantity applied_loads: name, body, kind
     flexible     how flexible bodies bend, as plain data
-    watched      gives what elements of load want to be looked at, in the order of the quantity watches
+    validity_checks   gives ranges of validity of loads, in the order of the quantity validity_checks
     events       what is looked for along a motion (see model.event), in the order of the quantity events
     contacts     rigid ones, place by place (see model.contacts.lowering); compliant: likewise
     contact_groups   those whose pairs are found along a motion
@@ -120,7 +120,7 @@ class Equations(EquationsFacade):
     connections: tuple[tuple[str, str, str, str], ...] = ()
     acting: tuple[tuple[str, str, str], ...] = ()
     down: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    watched: Callable[[], Sequence[Any]] = tuple
+    validity_checks: Callable[[], Sequence[Any]] = tuple
     events: tuple[Any, ...] = ()
     contacts: tuple[Any, ...] = ()
     compliant: tuple[Any, ...] = ()

@@ -106,7 +106,7 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         motions=tuple(s.name for s in equations.symbols.inputs if isinstance(s, GivenMotion)),
         events=event_records(equations), event_leaves=tuple(event_leaves(equations)),
         charts=tuple(Chart(*chart) for chart in equations.charts),
-        watches=tuple(ValidityRange(w.label, w.least, w.most, w.message, w.summed) for w in equations.watched()),
+        validity_checks=tuple(ValidityRange(w.label, w.least, w.most, w.message, w.summed) for w in equations.validity_checks()),
         switches=tuple(JumpRecord(**description(jump, equations.printed_leaves())) for jump in switches(equations)),
         not_smooth=not_smooth(equations.quantity("rhs").tolist()),
         connections=tuple(equations.connections), acting=tuple(equations.acting), down=equations.down,

@@ -57,7 +57,7 @@ def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...
         return ("rhs",)
     names = ["rhs", *(CORRECTIONS if equations.constraints else ())]
     if right_side == RightSide():  # evaluated in or after every simulation
-        names += [n for n in ("watches", "switches") if has_function(equations, n)]
+        names += [n for n in ("validity_checks", "switches") if has_function(equations, n)]
     if right_side.adjoint is not None:
         return (*names, *adjoints_of(equations))
     if right_side.sensitivities:

@@ -84,7 +84,7 @@ FUNCTIONS = _entries(
     ("weights", "weights", ("n_b", "3"), "weight of every body, which acts at its centre of mass, n-frame, N", "gravity"),
     ("frames", "frames", ("n_b", "12"), "origin and rotation (row by row) of every body's frame, n-frame", _BODIES),
     ("positions", "positions", None, "centres of mass, n-frame, m", ""),
-    ("watches", "watches", None,
+    ("validity_checks", "validity_checks", None,
      "values that have a range of validity: draft, tilt and the like", "loads with a range of validity"),
     ("compliant_contacts", "compliant_contacts", None,
      "gap, m, slip speed that counts as sticking, forces, N, and slips, m/s, of every compliant contact", "compliant contacts"),

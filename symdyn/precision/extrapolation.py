@@ -72,12 +72,12 @@ def integrate(field: Field, span: tuple[Any, Any], x: Sequence[Any], tolerance: 
     x, h = list(x), (end - t) / 100
     here = None if sides is None else sides(t, x)
 
-    def watched(t: Any, x: Sequence[Any]) -> list[Any]:
+    def one_sided(t: Any, x: Sequence[Any]) -> list[Any]:
         if sides is not None and sides(t, x) != here:
             raise _Beyond
         return field(t, x)
 
-    rule = partial(midpoint, watched) if sides is not None else rule or partial(midpoint, field)
+    rule = partial(midpoint, one_sided) if sides is not None else rule or partial(midpoint, field)
     rows, made, rejected, evaluations, at_once = _FIRST_ROWS, 0, 0, 0, 0
     kinks: list[Any] = []
     while t < end:

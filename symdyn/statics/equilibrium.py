@@ -16,7 +16,7 @@ from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium, Simulat
 from symdyn.real_numbers import real_of
 from symdyn.runtime.consistent import normalised, number
 from symdyn.runtime.masses import real_parameters
-from symdyn.runtime.solutions.validity import WATCHES, warn
+from symdyn.runtime.solutions.validity import VALIDITY_CHECKS, warn
 from symdyn.shown import name_of, shown
 from symdyn.statics.analysis import Analysis
 from symdyn.statics.gimbal import REMEDY, lock
@@ -562,8 +562,8 @@ def _warn_of_validity(search: Search) -> None:
     """Warn where validity checks of elements fail, and of forces that depend on time."""
     trial = search.best
     point, name = trial.point, trial.point.module.name
-    if point.module.metadata.watches:
-        warn(point.module, point.evaluate(WATCHES), "in equilibrium", 5)
+    if point.module.metadata.validity_checks:
+        warn(point.module, point.evaluate(VALIDITY_CHECKS), "in equilibrium", 5)
     if "t" not in point.module.library("balance").metadata.arguments.get("balance", ()):
         return
     labels, allowed = coordinate_names(point.module.metadata), search.allowed(trial)

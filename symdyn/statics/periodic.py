@@ -47,8 +47,8 @@ TANGENT = 1e-6
 # The equations are compared with those a period later at so many times, of which none is a simple part of a period; how much, of
 # the largest rate, they may differ.
 SAMPLES, PERIODIC = 38, 1e-6
-# At how many times a motion whose right-hand side may jump is looked at.
-WATCHED = 201
+# Number of times at which a motion is kept whose right-hand side may jump.
+TIMES_WITH_JUMPS = 201
 # What is said of initial values that nothing depends on, such as those of a coordinate that is prescribed: nothing is wrong.
 IDLE = "nothing in this motion depends on"
 # What a change of a cyclic coordinate may change of the rest, by its size.
@@ -368,8 +368,8 @@ class _Problem:
 
     def shot(self, x: np.ndarray, period: float) -> _Shot:
         """Where a start is after a period, with what it depends on. Raises EvaluationError where the motion stops early."""
-        rows = WATCHED if self.module.metadata.switches else 2  # jumps are seen from row to row
-        run, doubts = self.watched(x, period, rows, [f"{name}(0)" for name in self.module.metadata.x])
+        rows = TIMES_WITH_JUMPS if self.module.metadata.switches else 2  # jumps are seen from row to row
+        run, doubts = self.with_warnings(x, period, rows, [f"{name}(0)" for name in self.module.metadata.x])
         S = run.sensitivity.matrix
         self.check_cyclic(S[-1])
         left, sizes, _ = np.linalg.svd(self.keeps[:, None] * S[0])
@@ -448,10 +448,11 @@ class _Problem:
 
     def solution(self, x: np.ndarray, period: float, n: int, by: Sequence[str] | None = None) -> Solution:
         """A motion over a period. Raises EvaluationError where it stops early."""
-        return self.watched(x, period, n, by)[0]
+        return self.with_warnings(x, period, n, by)[0]
 
-    def watched(self, x: np.ndarray, period: float, n: int, by: Sequence[str] | None = None) -> tuple[Solution, tuple[str, ...]]:
-        """The same, with what is warned of in it."""
+    def with_warnings(self, x: np.ndarray, period: float, n: int,
+                      by: Sequence[str] | None = None) -> tuple[Solution, tuple[str, ...]]:
+        """The same with its warnings."""
         sizes = self.module.metadata.sizes
         times = np.linspace(self.t, self.t + period, n)
         with warnings.catch_warnings(record=True) as caught:

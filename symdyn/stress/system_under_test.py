@@ -31,7 +31,7 @@ NEARBY = {"floating_crane": {"beta": 0.2}}
 # Derivatives, and forms for other purposes.
 IDENTIFICATION, LONG = ("regressor", "inertial_parameters", "base_regressor", "base_parameters"), 1000
 SELDOM = ("jacobian_x", "jacobian_inputs", "input_matrix", "jacobian_params", "power_x", "reactions_by_lam", "residual",
-          "watches", "ground_rotation", "drawn_lengths", "events", "event_resets", "reset_directions")
+          "validity_checks", "ground_rotation", "drawn_lengths", "events", "event_resets", "reset_directions")
 
 
 def named(name: str) -> System:

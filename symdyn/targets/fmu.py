@@ -101,7 +101,7 @@ def source_of(equations: Equations, specialize: Mapping[Any, float] | None) -> t
     whole = equations.again() if equations.again is not None else equations
     bound = some(specialize, [p.name for p in whole.symbols.parameters], "specialize", whole.name)
     with collector_paused():
-        names = [n for n in groups.of_right_side(whole, RightSide()) if n not in ("watches", "switches")]
+        names = [n for n in groups.of_right_side(whole, RightSide()) if n not in ("validity_checks", "switches")]
         names += [n for n in ("outputs", "energy") if has_function(whole, n)]
         by = {"x": True, "inputs": bool(whole.symbols.inputs), "params": len(whole.symbols.parameters) > 0 and not bound}
         matrices = [("jacobian_" if of == "rhs" else f"{of}_by_") + to for of in ("rhs", "outputs", "energy") if of in names

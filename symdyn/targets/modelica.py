@@ -50,7 +50,7 @@ SAMPLES, REACH, COARSEST = 3, 0.3, 1e-6
 # A unit quaternion is made one again when the square of its length is off by so much; a violation of constraints that is
 # reported, as a part of the mechanism's length.
 UNIT, VIOLATED = "1e-6", "1e-3"
-_FUNCTIONS = ("rhs", "outputs", "energy", "events", "event_resets", "watches")
+_FUNCTIONS = ("rhs", "outputs", "energy", "events", "event_resets", "validity_checks")
 _OWN_FUNCTIONS = ("symdyn_asinh", "symdyn_acosh", "symdyn_atanh", "symdyn_erf")
 
 
@@ -164,8 +164,8 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
                            [*flat.results.get("outputs", ()), *flat.results.get("energy", ())], strict=True)),
         "events": list(zip(events, flat.results.get("events", ()), strict=True)),
         "clauses": _clauses(metadata, x, events, flat.results.get("event_resets", ())),
-        "watches": [(" and ".join(_within(w, value)), _message(w.message, value))
-                    for w, value in zip(metadata.watches, flat.results.get("watches", ()), strict=True)
+        "validity_checks": [(" and ".join(_within(w, value)), _message(w.message, value))
+                    for w, value in zip(metadata.validity_checks, flat.results.get("validity_checks", ()), strict=True)
                     if not w.summed and _within(w, value)],
         "violations": [v for v in (
             _Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),

@@ -52,7 +52,7 @@ BATCH, MORE, IN_VIEW = 60, 150, 200
 NOT_REACHED, UNSEEN = "reachable.filter(e => !reached.has(e))", "[...unseen].filter(e => reachable.includes(e))"
 
 
-class Watched:
+class CheckedPage:
     """A page with all that it requests and reports; faults of one document after the other."""
 
     def __init__(self, browser: Any, **options: Any) -> None:
@@ -121,31 +121,31 @@ def pages(site: Path) -> list[Path]:
     return sorted(page for page in site.rglob("*.html") if "_static" not in page.parts)
 
 
-def faults(watched: Watched, file: Path) -> Iterator[str]:
+def faults(checked: CheckedPage, file: Path) -> Iterator[str]:
     """Of a page of text."""
-    yield from watched.open(file)
-    yield from watched.wider()
-    yield from watched.unreadable()
-    yield from watched.unreached()
+    yield from checked.open(file)
+    yield from checked.wider()
+    yield from checked.unreadable()
+    yield from checked.unreached()
 
 
-def faults_of_view(watched: Watched, file: Path) -> Iterator[str]:
-    yield from watched.open(file)
-    yield from watched.blank()
-    if watched.page.evaluate("document.documentElement.scrollWidth > innerWidth"):
+def faults_of_view(checked: CheckedPage, file: Path) -> Iterator[str]:
+    yield from checked.open(file)
+    yield from checked.blank()
+    if checked.page.evaluate("document.documentElement.scrollWidth > innerWidth"):
         yield "wider than the window"
-    yield from (f"contrast: {one}" for one in watched.page.evaluate(CONTRAST))
-    yield from watched.unreached()
-    yield from watched.said()
+    yield from (f"contrast: {one}" for one in checked.page.evaluate(CONTRAST))
+    yield from checked.unreached()
+    yield from checked.said()
 
 
 def main(site: Path) -> int:
     found, begun = 0, time.perf_counter()
     listed = [(file, faults) for file in pages(site)] + [(file, faults_of_view) for file in sorted(site.glob("_static/*.html"))]
     with browser() as opened:
-        watched = Watched(opened)
+        checked = CheckedPage(opened)
         for file, look in listed:
-            for fault in look(watched, file):
+            for fault in look(checked, file):
                 print(f"{file.relative_to(site)}: {fault}", flush=True)
                 found += 1
     print(f"{len(listed)} pages opened, {found} faults, {time.perf_counter() - begun:.0f} s")

@@ -75,12 +75,13 @@ class LeafSite:
         return vector(*(self.R @ wrench[0]), *(self.R @ wrench[1]))
 
     def tape(self, action: Action) -> Tape:
-        """Generalized forces (elastic, other), wrenches, the potential and minus its gradient, watched values, power."""
+        """Generalized forces (elastic, other), wrenches, the potential and minus its gradient, checked values, power."""
         gradient = [forward(self.recorder, [action.potential], {leaf: 1})[0] for leaf in self.coordinates]
         return Tape.of(self.recorder, elastic=self.generalized(action.elastic), other=self.generalized(action.other),
                        f=action.other[0] + action.elastic[0], n=action.other[1] + action.elastic[1],
                        potential=np.array([action.potential], dtype=object), gradient=-vector(*gradient),
-                       watches=np.array([w.value for w in action.watches], dtype=object), power=self.power(action.other))
+                       validity_checks=np.array([w.value for w in action.validity_checks], dtype=object),
+                       power=self.power(action.other))
 
 
 def tape_of(element: Element, turned: bool = False, **symbols: Sequence[sp.Symbol]) -> Tape:

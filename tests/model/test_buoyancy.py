@@ -64,11 +64,11 @@ def poses(n: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def recorded(loads: dict[str, Any], **options: Any) -> tuple[Site, Tape]:
-    """Wrench, potential, watched part, and attitude of a body that floats."""
+    """Wrench, potential, checked part, and attitude of a body that floats."""
     site = Site.of()
     action = sd.Buoyancy("hull", **loads, density=RHO, **options).act(site)  # type: ignore[arg-type]
     f, n = action.elastic
-    return site, site.tape(f=f, n=n, V=[action.potential], part=[action.watches[0].value], R=site.R, p=site.p)
+    return site, site.tape(f=f, n=n, V=[action.potential], part=[action.validity_checks[0].value], R=site.R, p=site.p)
 
 
 # -- the pressure on the faces
@@ -204,7 +204,7 @@ def test_keel_or_deck_in_the_water_plane(z: float, part: float, stiffness: int) 
     site = Site.of()
     action = sd.Buoyancy("hull", **BARGE, density=RHO).act(site)
     lift = forward(site.algebra.recorder, [action.elastic[0][2]], {site.leaves[2]: 1})
-    tape = site.tape(rate=lift, part=[w.value for w in action.watches], f=action.elastic[0])
+    tape = site.tape(rate=lift, part=[w.value for w in action.validity_checks], f=action.elastic[0])
     found = evaluate_rows(tape, {**dict.fromkeys(POSE, 0.0), "z": z}, 1)
     assert found["part"][0].tolist() == [part, part]
     np.testing.assert_allclose(found["rate"], [[-stiffness * WEIGHT * 1500]], rtol=1e-14)
@@ -213,7 +213,7 @@ def test_keel_or_deck_in_the_water_plane(z: float, part: float, stiffness: int) 
 
 def test_the_watches() -> None:
     site = Site.of()
-    low, high = sd.Buoyancy("hull", **BARGE, density=RHO, name="hull's").act(site).watches
+    low, high = sd.Buoyancy("hull", **BARGE, density=RHO, name="hull's").act(site).validity_checks
     assert low.label == "immersed part of hull's" and 0 < low.least < 1e-6 and low.most == np.inf
     assert high.least == -np.inf and 1 - 1e-6 < high.most < 1
     assert low.message.format(value=0.0) == ("hull's: the box has left the water: the immersed part of its volume is 0.0")

@@ -154,14 +154,14 @@ def test_the_series_of_the_rotation_vector_meets_the_closed_form() -> None:
 def test_tilt_is_watched() -> None:
     site = LeafSite()
     action = stiffness(name="water plane").act(site)  # type: ignore[arg-type]
-    watch = action.watches[0]
-    assert (watch.label, watch.most) == ("tilt of water plane", TILT) and watch.least < 0
-    assert "water plane" in watch.message and "{value}" in watch.message and "20 degrees" in watch.message
+    check = action.validity_checks[0]
+    assert (check.label, check.most) == ("tilt of water plane", TILT) and check.least < 0
+    assert "water plane" in check.message and "{value}" in check.message and "20 degrees" in check.message
     x = pose(8)
-    found = evaluate_rows(site.tape(action), x, 1)["watches"][0, 0]
+    found = evaluate_rows(site.tape(action), x, 1)["validity_checks"][0, 0]
     assert found == pytest.approx(np.degrees(np.arccos(np.cos(x["theta"]) * np.cos(x["phi"]))), rel=1e-12)
     level = pose(8, phi=0.0, theta=0.0)
-    assert evaluate_rows(site.tape(action), level, 1)["watches"][0, 0] == 0
+    assert evaluate_rows(site.tape(action), level, 1)["validity_checks"][0, 0] == 0
 
 
 # -- damping

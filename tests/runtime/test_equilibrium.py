@@ -381,7 +381,7 @@ def test_forces_that_depend_on_time_are_told() -> None:
         assert module.equilibrium(t=0.5, params={"A": 0.0})["q"] == 0.0
 
 
-def test_elements_that_watch_warn_in_numbers() -> None:
+def test_validity_checks_warn_with_numbers() -> None:
     """A box held above the water by a stiff spring."""
     z = sd.coordinates("z")
     s = sd.System("raft", gravity=[0, 0, -9.81])

@@ -193,14 +193,14 @@ def test_equations_by_hand_and_constraints_have_reports(tmp_path: Path) -> None:
     assert float(row[1]) == pytest.approx(np.abs(solution.constraint_violation).max(), rel=0.1)
 
 
-def test_what_loads_look_at_is_told() -> None:
-    looked_at = [ValidityRange("draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"),
+def test_validity_checks_are_listed() -> None:
+    ranges = [ValidityRange("draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"),
                  ValidityRange("tilt", -np.inf, 0.3, "too steep: {value}"),
                  ValidityRange("creep", -np.inf, 4.0, "it creeps {value} m", True)]
     values = np.column_stack([np.linspace(0.5, 4, 11), np.linspace(-1, 0.2, 11), np.full(11, 0.5)])
-    run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values,
-                               module=SimpleNamespace(metadata=SimpleNamespace(watches=looked_at), functions=("watches",)))
-    draft, tilt, creep = run_tables.watches(run)
+    module = SimpleNamespace(metadata=SimpleNamespace(validity_checks=ranges), functions=("validity_checks",))
+    run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values, module=module)
+    draft, tilt, creep = run_tables.validity_checks(run)
     assert draft["outside"] and draft["message"] == "the box leaves the water at a draft of 0.5 m"
     assert (draft["least"], draft["most"], draft["limits"]) == ("0.5", "4", "from 1 to 9")
     assert not tilt["outside"] and not tilt["message"] and tilt["limits"] == "to 0.3"

@@ -316,7 +316,7 @@ def test_what_the_text_of_a_function_raises_in_evaluations(falling: Any) -> None
 
 def test_what_the_text_of_a_function_raises_in_an_event() -> None:
     x = sd.coordinates("x")
-    system = sd.System("watched", gravity=[0, -10])
+    system = sd.System("fall", gravity=[0, -10])
     body = system.add_body("body", mass=1)
     system.add_joint(sd.Prismatic("way", system.ground, body, x, axis=[0, 1]))
     system.add_event("fast", sd.External("table", ["v"], python=table)(x.dot) + 10)

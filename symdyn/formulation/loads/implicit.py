@@ -57,8 +57,7 @@ def implicit(expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
 
 @dataclass(frozen=True)
 class Settled:
-    """Expression of a load -> its value; the determinant of I - G phi' that is the smallest, 1 without such loads, and a watch on
-    it."""
+    """Expression of a load -> its value; validity: check of the smallest determinant of I - G phi', 1 without such loads."""
 
     values: Mapping[sp.Expr, Any]
     validity: Validity

@@ -127,9 +127,10 @@ class Loads:
                     total = total + self.algebra.expression(load.stiffness) * (stretch * stretch) / 2
         return total
 
-    def watches(self) -> list[Validity]:
-        """What elements want to be looked at, and how far elastic bodies bend."""
-        result = [validity for load in self.model.loads if isinstance(load, Element) for validity in self._action(load).watches]
+    def validity_checks(self) -> list[Validity]:
+        """Validity checks of elements and compliant contacts, and of how far elastic bodies bend."""
+        actions = [self._action(load) for load in self.model.loads if isinstance(load, Element)]
+        result = [validity for action in actions for validity in action.validity_checks]
         result += [self._bending(body) for body in self.tree.flexible]
         result += [Validity(f"depth of contact {c.name}", -self.algebra.expression(c.gap), -math.inf, c.depth,
                             f"contact {c.name}: it goes {{value}} m deep, its compliance is meant for {c.depth:g} m; a larger "

@@ -152,7 +152,7 @@ class TreeQuantities(Motion):
             own["contact_coefficients"] = self.contact_coefficients
         limited = any(contact.depth is not None or contact.creep is not None for contact in self.model.compliant)
         if limited or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
-            own["watches"] = lambda: vector(*[validity.value for validity in self.loads.watches()])
+            own["validity_checks"] = lambda: vector(*[validity.value for validity in self.loads.validity_checks()])
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation
         if self.model.contacts:

@@ -48,8 +48,8 @@ class Buoyancy(Element):
     without   boxes inside them that are open to the water, such as a moonpool
     density   of the water, kg/m^3; gravity: m/s^2, default: the model's, which must point along -z
 
-    All may hold parameters. Its potential is the integral of density*gravity*depth over the wet part. Watched is the wet part
-    of the volume, which is between 0 and 1 while the body floats.
+    All may hold parameters. Its potential is the integral of density*gravity*depth over the wet part. Its validity checks
+    are of the wet part of the volume, which is between 0 and 1 while the body floats.
 
     >>> system = sd.System("float", gravity=[0, 0, -9.81])
     >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
@@ -105,10 +105,11 @@ class Buoyancy(Element):
             S = S + volume * (wet[0] * center + size * wet[1:])
         V = a.name(f"displaced_{self.label}", V)
         label, part, result = f"immersed part of {self.where}", V / whole, "the immersed part of its volume is {value}"
-        watches = (Validity(label, part, LEAST, math.inf, f"{self.where}: the box has left the water: {result}"),
-                   Validity(label, part, -math.inf, 1 - LEAST, f"{self.where}: it is under water altogether: it sinks: {result}"))
+        validity_checks = (
+            Validity(label, part, LEAST, math.inf, f"{self.where}: the box has left the water: {result}"),
+            Validity(label, part, -math.inf, 1 - LEAST, f"{self.where}: it is under water altogether: it sinks: {result}"))
         return Action(elastic=(weight * V * up, weight * cross(S, up)), potential=-weight * (dot(up, S) + height * V),
-                      watches=watches)
+                      validity_checks=validity_checks)
 
     def _gravity(self, site: Site) -> Any:
         if self.gravity is not None:

@@ -98,11 +98,11 @@ class MooringLine(Element):
         pull = total * h / distance
         f = -(site.R.T @ vector(pull * d[0], pull * d[1], total * v))
         wrench = f, cross(fairlead, f)
-        watches = (self._strain(site, total / stiffness * a.sqrt(h * h + v * v)),)
+        validity_checks = (self._strain(site, total / stiffness * a.sqrt(h * h + v * v)),)
         if not is_zero(friction):
-            return Action(other=wrench, watches=watches)
+            return Action(other=wrench, validity_checks=validity_checks)
         return Action(elastic=wrench, potential=total * length * potential(recorder, self.seabed, (h, v), values),
-                      watches=watches)
+                      validity_checks=validity_checks)
 
     def _strain(self, site: Site, strain: Any) -> Validity:
         unit = "" if symbols_of(self.stiffness) else f" of {float(self.stiffness):.4g} N"

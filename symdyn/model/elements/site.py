@@ -74,7 +74,7 @@ def nothing() -> Wrench:
 
 @dataclass(frozen=True)
 class Action:
-    """Wrenches (f in N, n in N m about the body's origin, body axes), potential energy (J) and watches.
+    """Wrenches (f in N, n in N m about the body's origin, body axes), potential energy (J) and validity checks.
 
     elastic   minus the gradient of the potential; other: what does work
     """
@@ -82,4 +82,4 @@ class Action:
     elastic: Wrench = field(default_factory=nothing)
     other: Wrench = field(default_factory=nothing)
     potential: Any = 0
-    watches: tuple[Validity, ...] = ()
+    validity_checks: tuple[Validity, ...] = ()

@@ -100,7 +100,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         options |= {"sensitivities": columns.given, "sensitivity_control": controlled}
     over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
     varying = inputs if by_time else None
-    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
+    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.validity_checks else fixed
     rest = over_time | {"events": events, "event_spacing": asked.event_spacing}
     if note and gpu is None:
         solution = _one_by_one(module, asked, varying, given, note, options | rest)

@@ -1,4 +1,4 @@
-"""What loads want to be looked at in many motions: in how many they leave what the loads are meant for, and how far at worst."""
+"""Validity checks of many motions: in how many of them values leave the ranges in which loads are valid, and how far at worst."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symdyn.errors import EvaluationError
-from symdyn.runtime.solutions.validity import WATCHES, Watched
+from symdyn.runtime.solutions.validity import VALIDITY_CHECKS, ValidityCheck
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 
 def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> list[str]:
-    """A sentence for every value that is not as it is meant in some of the motions, at the states that are kept.
+    """A sentence for every value that is outside its range of validity in some of the motions, at the states that are kept.
 
     t, x             (n_t,), (n, n_t, n_x), NaN where there is no state
     params, inputs   (n, n_p), (n, n_in), or one row for all; or inputs at every time, (n, n_t, n_in)
     """
-    about = module.metadata.watches
+    about = module.metadata.validity_checks
     if not about or not len(x):
         return []
     values = np.full((*x.shape[:2], len(about)), np.nan)
@@ -43,20 +43,20 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
         low, high = np.fmin.reduce(column, axis=1), np.fmax.reduce(column, axis=1)
         wrong = np.flatnonzero((low < least) | (high > most))
         if len(wrong):
-            worst = Watched(label, least, most, float(low[wrong].min()), float(high[wrong].max()), message)
+            worst = ValidityCheck(label, least, most, float(low[wrong].min()), float(high[wrong].max()), message)
             messages.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, at worst: "
                             f"{worst.message}")
     return messages
 
 
 def _rows(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """The function `watches`, (n, n_w); NaN where it cannot be evaluated."""
-    result = np.full((len(x), len(module.metadata.watches)), np.nan)
+    """The function `validity_checks`, (n, n_w); NaN where it cannot be evaluated."""
+    result = np.full((len(x), len(module.metadata.validity_checks)), np.nan)
     try:
         if len(x):
-            result[:] = module.evaluate(WATCHES, t, x, params, inputs).reshape(result.shape)
+            result[:] = module.evaluate(VALIDITY_CHECKS, t, x, params, inputs).reshape(result.shape)
     except EvaluationError:
         for k in range(len(x)):
             with contextlib.suppress(EvaluationError):
-                result[k] = module.evaluate(WATCHES, t[k], x[k], params, inputs[k]).ravel()
+                result[k] = module.evaluate(VALIDITY_CHECKS, t[k], x[k], params, inputs[k]).ravel()
     return result

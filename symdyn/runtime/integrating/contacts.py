@@ -1141,18 +1141,18 @@ class _Phases:
         """Contacts whose forces are beyond their bounds, by what the laws of contact take for rounding, and go on from there:
         they open or slip at once, since no zero of their events follows. forces: of all rows."""
         size = float(np.abs(forces).max(initial=0.0))
-        watched = {}  # events with the sizes of what stands in them
+        candidates = {}  # events with the sizes of what stands in them
         for k, (mode, own) in enumerate(zip(self.modes, self.events, strict=True)):
             pressed = float(forces[self.normal[k]]) if self.records[k].normal else 1.0
             if mode != OPEN and "opens" in own and pressed <= AT_BOUND * size:
-                watched[k, "opens"] = size
+                candidates[k, "opens"] = size
             bound = float(at.static[k]) * pressed
             if mode == STICKING and bound - np.linalg.norm(forces[self.tangents[k]]) <= AT_BOUND * size:
-                watched[k, "slips"] = size * max(bound, RESOLVED * size)
-        if not watched:
+                candidates[k, "slips"] = size * max(bound, RESOLVED * size)
+        if not candidates:
             return []
         p, n, end = self._parameters(), self.request.n_state, self.request.span[1]
-        places, sizes = [self.events[k][what] for k, what in watched], np.array(list(watched.values()))
+        places, sizes = [self.events[k][what] for k, what in candidates], np.array(list(candidates.values()))
         now = self._values("events", t, x[:n], p)[places]
         rate = self._values("rhs", t, x[:n], p).copy()
         unknown, result = now < 0, np.zeros(len(places), dtype=bool)
@@ -1163,7 +1163,7 @@ class _Phases:
             result |= known & (change < 0)
             unknown &= ~known
             after *= LARGER
-        return [one for one, goes in zip(watched, result.tolist(), strict=True) if goes]
+        return [one for one, goes in zip(candidates, result.tolist(), strict=True) if goes]
 
     def _choose(self, t: float, x: np.ndarray, at: Numbers, closed: Sequence[int]) -> np.ndarray:
         """The modes of the contacts that are closed, from the accelerations; the others are open. The forces of all rows."""

@@ -25,7 +25,7 @@ from symdyn.runtime.integrating.run_record import STATUS
 from symdyn.runtime.integrating.simulate import checked_positive, checked_tolerances, integrate, stabilization_of
 from symdyn.runtime.integrating.stabilization import Projector
 from symdyn.runtime.masses import real_parameters
-from symdyn.runtime.solutions.validity import WATCHES, warn
+from symdyn.runtime.solutions.validity import VALIDITY_CHECKS, warn
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ class CompiledSolver(OdeSolver):
             self._checked(status)
             return False, stopped_because(self.module, run, status, run.report())
         self.t, self.y = float(self._t[0]), self._x[0].copy()
-        if self.module.metadata.watches or self.module.metadata.charts:
+        if self.module.metadata.validity_checks or self.module.metadata.charts:
             self._states.append((self.t, self.y))
             if status == STATUS.DONE:
                 self._warn()
@@ -194,8 +194,8 @@ class CompiledSolver(OdeSolver):
         """Warnings of simulate about a whole motion."""
         t, x = (np.array(part) for part in zip(*self._states, strict=True))
         request, module = self.run.request, self.module
-        if module.metadata.watches:
-            warn(module, module.evaluate(WATCHES, t, x, request.p, request.inputs.rows(t, x)), "in this motion", 4, t)
+        if module.metadata.validity_checks:
+            warn(module, module.evaluate(VALIDITY_CHECKS, t, x, request.p, request.inputs.rows(t, x)), "in this motion", 4, t)
         warn_near_lock(module, request, t, x, lambda part: integrate(module, part, self.setting.method), 4)
 
     def _dense_output_impl(self) -> WithinStep:

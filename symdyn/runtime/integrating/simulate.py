@@ -41,7 +41,7 @@ from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.memory import demand
 from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.solutions.solution import Solution
-from symdyn.runtime.solutions.validity import WATCHES, warn
+from symdyn.runtime.solutions.validity import VALIDITY_CHECKS, warn
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -163,8 +163,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
-        if metadata.watches and len(solution.t):
-            warn(module, solution.rows(WATCHES), "in this motion", 3, solution.t)
+        if metadata.validity_checks and len(solution.t):
+            warn(module, solution.rows(VALIDITY_CHECKS), "in this motion", 3, solution.t)
         if metadata.charts:
             warn_near_lock(module, known, solution.t, solution.x,
                            lambda part: integrate(module, part, method), 3)

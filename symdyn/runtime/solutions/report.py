@@ -41,7 +41,7 @@ def page(solution: Solution) -> str:
         name=module.name, version=symdyn.__version__, success=solution.success, message=solution.message,
         fallback=module.fallback, facts=run_tables.facts(solution), parameters=run_tables.parameters(solution),
         start=run_tables.start(solution), extremes=run_tables.extremes(solution), constraints=run_tables.constraints(solution),
-        watches=run_tables.watches(solution), energy=_energy_table(energy), no_energy=_why_no_energy(solution),
+        validity_checks=run_tables.validity_checks(solution), energy=_energy_table(energy), no_energy=_why_no_energy(solution),
         mechanism=embedded.mechanism(solution, _times(solution)), curves=embedded.curves(solution),
         balance=None if energy is None else embedded.balance(solution, energy.rows), generated=_generated(solution))
 

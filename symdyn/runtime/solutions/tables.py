@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.runtime.solutions.validity import WATCHES, watched
+from symdyn.runtime.solutions.validity import VALIDITY_CHECKS, checked
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
@@ -159,14 +159,14 @@ def constraints(solution: Solution) -> list[dict[str, str]]:
     return [{"name": name, "position": f"{a:.2g}", "velocity": f"{b:.2g}"} for name, a, b in zip(names, off, rate, strict=True)]
 
 
-def watches(solution: Solution) -> list[dict[str, Any]]:
-    """What loads want to be looked at: range of each value, its limits, and what it means if it leaves them."""
+def validity_checks(solution: Solution) -> list[dict[str, Any]]:
+    """Range of each value that has a range of validity, its limits, and the meaning of values outside."""
     module = solution.module
-    if not module.metadata.watches or not len(solution.t):
+    if not module.metadata.validity_checks or not len(solution.t):
         return []
     return [{"label": value.label, "least": number(value.low), "most": number(value.high),
              "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}
-            for value in watched(module, solution.rows(WATCHES), solution.t)]
+            for value in checked(module, solution.rows(VALIDITY_CHECKS), solution.t)]
 
 
 def _limits(least: float, most: float) -> str:

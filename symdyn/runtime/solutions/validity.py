@@ -1,4 +1,4 @@
-"""What loads want to be looked at: whether the values of a motion or of an equilibrium leave what the loads are meant for."""
+"""Validity checks: whether values of a motion or of an equilibrium leave the ranges in which loads are valid."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from symdyn.errors import SimulationWarning
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-WATCHES = "watches"
+VALIDITY_CHECKS = "validity_checks"
 
 
 @dataclass(frozen=True)
-class Watched:
-    """A value that was looked at: least and most that are meant, low and high found; message: what it means outside."""
+class ValidityCheck:
+    """A value with its range of validity, least to most, and its range in the result, low to high; meaning: of values outside."""
 
     label: str
     least: float
@@ -33,14 +33,17 @@ class Watched:
 
     @property
     def message(self) -> str:
-        """What it means, with the worst number; "" inside."""
+        """The meaning with the worst number; "" inside."""
         worst = self.low if self.low < self.least else self.high
         return self.meaning.replace("{value}", f"{worst:.4g}") if self.outside else ""
 
 
-def watched(module: Module, values: Any, t: np.ndarray | None = None) -> list[Watched]:
-    """Of the function `watches` at one state or at rows of states; t: their times, (n_t,), without which sums are left out."""
-    about = module.metadata.watches
+def checked(module: Module, values: Any, t: np.ndarray | None = None) -> list[ValidityCheck]:
+    """The checks of values of the function `validity_checks` at one state or at rows of states.
+
+    t   times of the states, (n_t,), without which sums are left out
+    """
+    about = module.metadata.validity_checks
     rows = np.asarray(values, dtype=float).reshape(-1, len(about))
     there = np.isfinite(rows).all(axis=1)
     if not there.any():
@@ -51,12 +54,12 @@ def watched(module: Module, values: Any, t: np.ndarray | None = None) -> list[Wa
             if t is None:
                 continue
             column = np.array([np.trapezoid(column, t[there])])
-        result.append(Watched(one.label, one.least, one.most, float(column.min()), float(column.max()), one.message))
+        result.append(ValidityCheck(one.label, one.least, one.most, float(column.min()), float(column.max()), one.message))
     return result
 
 
 def warn(module: Module, values: Any, when: str, level: int, t: np.ndarray | None = None) -> None:
-    """Give a SimulationWarning for every value that is not as it is meant; t: see `watched`."""
-    for value in watched(module, values, t):
+    """Give a SimulationWarning for every value outside its range of validity; t: see `checked`."""
+    for value in checked(module, values, t):
         if value.outside:
             warnings.warn(f"{module.name}: {when}: {value.message}", SimulationWarning, stacklevel=level + 1)

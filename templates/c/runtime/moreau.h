@@ -441,7 +441,7 @@ static int symdyn_follow(symdyn_moreau *s, const symdyn_cones *c, double t, doub
 }
 
 // Add contacts that close until the middle of a step that ends at end; the first time after those that touch at its begin.
-static int symdyn_watch(
+static int symdyn_add_closing(
     symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, const double *end, int first, int *added) {
     double *middle = s->work;
     int failed = 0, more = 0;
@@ -558,13 +558,13 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     for (int i = 0; i < s->n_x; i++) end[i] = x[i] + h * s->xd[i];
     s->n_found = c->n = 0;
     s->updates_left = s->step_updates;
-    for (int round = 0, settled = 0, watched = 0;; round++) {
+    for (int round = 0, settled = 0, checked = 0;; round++) {
         int added = 0;
-        if (settled || (watched && s->rough_sweeps)) {
-            failed = symdyn_watch(s, c, t, h, x, end, !watched, &added);
+        if (settled || (checked && s->rough_sweeps)) {
+            failed = symdyn_add_closing(s, c, t, h, x, end, !checked, &added);
             if (failed) return failed;
             if (settled && !added) break;
-            watched = 1;
+            checked = 1;
             if (added) round = 0;
         }
         const int rough = added && s->rough_sweeps;
