@@ -76,12 +76,12 @@ def prove_equations(equations: Equations, bound: int = BOUND) -> Proofs:
     """Decide the identities that apply to the equations.
 
     bound   terms that a product may have; claims that need more are undecided where no state refutes them"""
-    subject = _Quantities(equations)
+    own = _Quantities(equations)
     symbols = equations.printed_leaves()
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     claims = []
     for name, pairs_of in CLAIMS:
-        result = pairs_of(subject)
+        result = pairs_of(own)
         if result is not None:
             pairs, columns = result
             claims.append(Claim(name, decide(equations.recorder, pairs, symbols, columns, units, bound)))
@@ -282,13 +282,13 @@ def _constraint_accelerations(s: _Quantities) -> Pairs | None:
 
 def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
     """Which of the claims exact algebra proves with products of up to QUICK terms, whatever machine it runs on."""
-    subject = _Quantities(equations)
+    own = _Quantities(equations)
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     positive = not_negative(equations.printed_leaves())
     proved = set()
     for name, pairs_of in (*CLAIMS, *SOLUTIONS):
         try:
-            result = pairs_of(subject) if name in names else None
+            result = pairs_of(own) if name in names else None
             if result is not None and zero(equations.recorder, result[0], QUICK, units, positive):
                 proved.add(name)
         except UnsupportedExpression:  # such as the derivative of a function of the user without one

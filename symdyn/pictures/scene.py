@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from symdyn.pictures.painter import Camera, cut, order, planes
+from symdyn.pictures.depth_order import Camera, cut, order, planes
 from symdyn.pictures.solids import Solids, Water
 
 _WATER_ALPHA = 0.38

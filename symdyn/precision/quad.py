@@ -27,7 +27,7 @@ from symdyn.tape.walk import Arithmetic, walk
 # Binary digits of a number, decimal ones that they surely hold, and decimal ones of the local errors that this is enough for.
 BITS, DIGITS, MOST = 113, 33, 28
 _BIAS = 16383
-_KERNELS = ("symdyn_cube", "symdyn_catenary")
+_INTRINSICS = ("symdyn_cube", "symdyn_catenary")
 # Literals of their templates that hold for doubles only: (1 +- 1/sqrt(3))/2, four times the rounding error, and its root.
 _FINER = {"0.7886751345948129": "0.788675134594812882254574390250978728", "9e-16": "8e-34",
           "0.21132486540518713": "0.211324865405187117745425609749021272", "1e-8": "1e-17"}
@@ -191,7 +191,7 @@ class _Writer(Arithmetic):
 
     def call(self, node: Node, args: list[str]) -> str:
         intrinsic = node.args[0]
-        if isinstance(intrinsic, UserFunction) or intrinsic.name not in _KERNELS:
+        if isinstance(intrinsic, UserFunction) or intrinsic.name not in _INTRINSICS:
             raise NotInQuad(f"{intrinsic.name} has no text with {BITS} binary digits")
         self.intrinsics.add(intrinsic.name)
         sizes = "".join(f"{n}, " for n in intrinsic.sizes)

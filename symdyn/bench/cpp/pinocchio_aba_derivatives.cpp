@@ -7,7 +7,7 @@
 // result of the one before. `derivatives`: row by row, those by the position, then those by the velocity
 extern "C" void aba_derivatives_loop(void *opened, long n, long fed, double *q, const double *u, double *derivatives)
 {
-    Contestant<double> &c = *static_cast<Contestant<double> *>(opened);
+    Model<double> &c = *static_cast<Model<double> *>(opened);
     Eigen::Map<Eigen::VectorXd> at(q, c.model.nq);
     const Eigen::Map<const Eigen::VectorXd> speeds(u, c.model.nv);
     const double start = q[fed];

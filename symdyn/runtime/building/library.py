@@ -120,7 +120,8 @@ class DeviceText:
 
     def evaluator(self, name: str) -> Evaluator:
         """Raises EvaluationError."""
-        raise EvaluationError(f"{self.metadata.name}: {name} is asked of a kernel, which integrates motions only")
+        raise EvaluationError(f"{self.metadata.name}: {name} cannot be evaluated by a kernel, which integrates motions only; "
+                              "evaluate it by module.evaluate")
 
 
 class CEvaluator:
