@@ -135,7 +135,7 @@ def run_tests(folder: Path, files: Sequence[str], limit: float, **environment: s
 def note_functions(notes: Path, jobs: int) -> None:
     """Write which test enters which functions, a line for each test; files that are noted as they are now are passed over.
 
-    The lines hold numbers of functions; `functions.json` beside them holds their names.
+    The lines hold numbers of functions; `functions.json` next to them holds their names.
     """
     notes.mkdir(parents=True, exist_ok=True)
     finished, names = notes / "files.json", notes / "functions.json"

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import symdyn
+from tests.test_words import STYLE, unwanted
 
-# In place of these words, names have those of docs/style.md and of the glossary: singular_fallback, vanishing_pivots, reject.
-NOT_NAMES = {"otherwise", "lockable", "locking", "told", "tells", "beside", "anew", "mend", "refuse", "refused", "doctor",
-             "yardstick", "contest", "contestant", "race", "subject", "painter", "lumping", "watch", "watches", "watched"}
-# Kernels are what GPUs run; on the tape there are intrinsic functions.
+# GPUs run kernels; the tape has intrinsic functions.
 KERNELS = {"kernel", "kernels"}
 FOR_GPUS = re.compile(r"gpu|_device\.py$|c/runtime/kernel\.h$")
 ROOT = Path(__file__).parents[1]
@@ -126,19 +124,26 @@ def test_the_recursions_of_the_lecture_are_no_source_of_code() -> None:
     assert readers == {"formulation/trees/recursive.py"}
 
 
-def unwanted(path: str, words: set[str]) -> set[str]:
-    return words & (NOT_NAMES if FOR_GPUS.search(path) else NOT_NAMES | KERNELS)
+@functools.cache
+def not_names() -> set[str]:
+    """Words of the first two tables of docs/style.md."""
+    style = STYLE.read_text(encoding="utf-8")
+    return {*unwanted(style), *unwanted(style, "not in names")}
+
+
+def wrong_words(path: str, words: set[str]) -> set[str]:
+    return words & (not_names() - KERNELS if FOR_GPUS.search(path) else not_names())
 
 
 def test_names_have_the_words_of_the_field() -> None:
-    assert {file.path: wrong for file in files() if (wrong := unwanted(file.path, file.words))} == {}
+    assert {file.path: wrong for file in files() if (wrong := wrong_words(file.path, file.words))} == {}
     assert words_of(ast.parse("def told(beside):\n    is_locking = beside")) == {"told", "beside", "is", "locking"}
-    assert unwanted("tape/intrinsics.py", {"kernel", "painter", "of"}) == {"kernel", "painter"}
-    assert unwanted("runtime/gpu/device.py", {"kernel", "painter", "of"}) == {"painter"}
+    assert wrong_words("tape/intrinsics.py", {"kernel", "painter", "of"}) == {"kernel", "painter"}
+    assert wrong_words("runtime/gpu/device.py", {"kernel", "painter", "of"}) == {"painter"}
 
 
 def test_names_of_files_have_the_words_of_the_field() -> None:
     paths = [path.relative_to(ROOT).as_posix() for folder in ("symdyn", "templates", "tests", "docs", "notebooks")
              for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     assert "tests/test_architecture.py" in paths
-    assert [path for path in paths if unwanted(path, set(re.split(r"[/_.]", path.lower())))] == []
+    assert [path for path in paths if wrong_words(path, set(re.split(r"[/_.]", path.lower())))] == []

@@ -252,7 +252,7 @@ def test_tuning_a_named_formulation_compares_its_frames(formulation: str) -> Non
     assert taken(equations).measured == min(c.measured for c in equations.candidates)
 
 
-def test_an_unknown_formulation_is_told() -> None:
+def test_an_unknown_formulation_is_reported() -> None:
     with pytest.raises(SymdynError, match="formulation 'newton' asked for; there are auto, embedding, recursive"):
         formulated(systems.pendulum(), "newton")
 

@@ -81,7 +81,7 @@ def test_help_and_list_come_without_sympy() -> None:
     assert listed.returncode == 0 and listed.stdout.splitlines()[-1] == "[]"
 
 
-def test_list_tells_what_each_system_is_and_takes(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_reports_what_each_system_is_and_takes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines if not line.startswith(" ")] == systems.names()
@@ -211,7 +211,7 @@ def test_simulate_saves_data_and_picture(here: Path, capsys: pytest.CaptureFixtu
     assert (folder / "double_pendulum.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_simulate_tells_energy_changes_and_takes_inputs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_reports_energy_changes_and_takes_inputs(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "cart_pole", "--t", "1", "--input", "F=3", "--no-picture"]) == 0
     assert re.search(r"energy goes from 0\.48\S* J to \S+ J by loads", capsys.readouterr().out)
 
@@ -234,15 +234,15 @@ def test_the_second_run_needs_no_sympy_and_gives_the_same(here: Path) -> None:
         assert set(a) == set(b) and all(np.array_equal(a[k], b[k]) for k in a)
 
 
-def test_without_matplotlib_data_are_saved_and_the_way_to_pictures_is_told(here: Path) -> None:
+def test_without_matplotlib_data_are_saved_and_the_way_to_pictures_is_reported(here: Path) -> None:
     done = run("simulate", "pendulum", "--gif", "--output", "out", before="sys.modules['matplotlib'] = None")
     assert done.returncode == 0 and not done.stderr
     assert "no picture: pictures need matplotlib: pip install 'symdyn[plot]'" in done.stdout
     assert {p.name for p in (here / "out").iterdir()} == {"pendulum.npz", "pendulum.csv"}
 
 
-def test_without_a_compiler_numpy_takes_over_and_says_so(monkeypatch: pytest.MonkeyPatch,
-                                                         capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_compiler_numpy_takes_over_and_reports_it(monkeypatch: pytest.MonkeyPatch,
+                                                            capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("SYMDYN_CC", "none")
     for _ in range(2):
         assert main(["simulate", "pendulum", "--t", "0.5", "--no-picture"]) == 0
@@ -386,7 +386,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_faults_of_a_users_file_are_told_as_its_own(name: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_faults_of_a_users_file_are_reported_as_its_own(name: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text, expected = FAULTY[name]
     (here / f"{name}.py").write_text(text, encoding="utf-8")
     said = refused(capsys, "derive", f"{name}.py")
@@ -414,7 +414,7 @@ def system(start=0.0):
 """
 
 
-def test_what_a_users_function_raises_is_told_with_its_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_users_function_raises_is_reported_with_its_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "mine.py").write_text(RAISING, encoding="utf-8")
     for start, t in (("0.0", "0.1"), ("2.0", "0: ")):
         told = refused(capsys, "simulate", "mine.py", "--backend", "numpy", "--no-picture", "--option", f"start={start}", code=3)
@@ -442,7 +442,7 @@ def test_derive_prints_constraints(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-def test_simulate_tells_how_constraints_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_reports_how_constraints_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = {}
     for way in ("projection", "baumgarte", "none"):
         assert main(["simulate", "four_bar", "--t", "2", "--no-picture", "--stabilization", way, "--rtol", "1e-6"]) == 0
@@ -464,7 +464,7 @@ def test_simulate_begins_with_a_consistent_state(kept: list[str], here: Path, ca
     assert ("q1 from 0.5 to" in said) == ("q1_dot from 1 to" in said) == (not kept)
 
 
-def test_simulate_tells_that_a_start_is_consistent(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_reports_that_a_start_is_consistent(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy", "--consistent"]
     assert main([*arguments, "--stabilization", "baumgarte=20"]) == 0
     assert "four_bar: the start is consistent as it is" in capsys.readouterr().out
@@ -539,13 +539,13 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["simulate"], "the following arguments are required: NAME"),
     ([], "the following arguments are required: COMMAND"),
 ])
-def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_arguments_are_reported(arguments: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert said in refused(capsys, *arguments)
     assert not list(here.rglob("*.npz"))
 
 
-def test_an_unusable_folder_or_compiler_is_told(here: Path, monkeypatch: pytest.MonkeyPatch,
-                                                capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unusable_folder_or_compiler_is_reported(here: Path, monkeypatch: pytest.MonkeyPatch,
+                                                    capsys: pytest.CaptureFixture[str]) -> None:
     (here / "taken").write_text("", encoding="utf-8")
     assert "taken" in refused(capsys, "simulate", "pendulum", "--backend", "numpy", "--output", "taken", code=1)
     monkeypatch.setenv("SYMDYN_CC", "no-such-compiler")

@@ -132,7 +132,7 @@ def test_a_stretched_pair_moves_infinitesimally_only() -> None:
     assert any("infinitesimal" in line for line in found.remarks) and not found.advice
 
 
-def test_contradictory_constraints_are_told_by_row() -> None:
+def test_contradictory_constraints_are_reported_by_row() -> None:
     s, q = two_bars("contradictory")
     s.add_constraint(q[0] + q[1], "one")
     s.add_constraint(2 * q[0] + 2 * q[1] - 1, "two")
@@ -148,7 +148,7 @@ def test_a_linkage_that_cannot_be_assembled() -> None:
     assert abs(found.residuals["close_x"]) > 0.1
 
 
-def test_what_no_motion_changes_is_told_not_raised() -> None:
+def test_what_no_motion_changes_is_reported_not_raised() -> None:
     s, _ = two_bars("offset")
     s.add_body("c", mass=1, inertia=1)
     s.add_joint(sd.Revolute("third", s.ground, "c", sd.coordinates("q3"), parent_point=[0, 1]))

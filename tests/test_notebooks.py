@@ -1,6 +1,6 @@
 """The notebooks: each .ipynb is made from the .py of the same name, and holds no outputs.
 
-After changing a .py, write the .ipynb anew: python tests/test_notebooks.py
+After changing a .py, write the .ipynb again: python tests/test_notebooks.py
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def notebook(source: Path) -> Any:
 
 
 def write(source: Path) -> Path:
-    """Write the .ipynb beside the .py."""
+    """Write the .ipynb next to the .py."""
     path = source.with_suffix(".ipynb")
     path.write_text(nbformat.writes(notebook(source)) + "\n", encoding="utf-8")
     return path

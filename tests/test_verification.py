@@ -200,7 +200,7 @@ def test_samples_fulfil_the_constraints_to_all_digits():
                 assert max(abs(v) for q in ("C", "C_dot") for v in s[q]) < mpmath.mpf(10) ** -27
 
 
-def test_without_a_consistent_state_it_says_so():
+def test_without_a_consistent_state_it_reports_it():
     x, y = sd.coordinates("x y")
     with pytest.warns(sd.ModelWarning, match="no state was found"):
         eq = sd.augmented([x, y], [1, 1], None, [x**2 + y**2 + 1], name="nowhere")
@@ -281,7 +281,7 @@ def test_what_rounding_of_constants_explains_is_reported():
     assert 1e-20 < work.residual < 1e-15 and work.residual < work.tolerance < 1e-13
 
 
-def test_lost_digits_are_told_from_wrong_equations():
+def test_lost_digits_are_distinguished_from_wrong_equations():
     """A mass matrix of the condition 1e24: at 30 digits the accelerations have six."""
     q1, q2 = sd.coordinates("q1 q2")
     system = sd.System("light", gravity=[0, -10, 0])

@@ -92,7 +92,7 @@ def test_sdist_holds_what_both_commands_of_the_readme_need(unpacked: Path) -> No
 
 
 def test_commands_of_the_readme_in_an_unpacked_sdist(unpacked: Path) -> None:
-    """As an editable installation runs them; of the tests those that need files beside the package."""
+    """As an editable installation runs them; of the tests those that need files next to the package."""
     printed = run(sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(unpacked)!r}); "
                   "from symdyn.cli import main; sys.exit(main(['demo']))", cwd=unpacked)
     assert "energy" in printed

@@ -1,12 +1,14 @@
-"""Spelling, and the words that docs/style.md does not want, in pages, notebooks and docstrings."""
+"""Spelling, and the words that docs/style.md does not want, in pages, notebooks, docstrings, comments, messages and templates."""
 
 from __future__ import annotations
 
 import ast
 import inspect
+import io
 import re
 import subprocess
 import sys
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,28 +19,56 @@ from tests.test_examples import PUBLIC
 
 ROOT = Path(__file__).parents[1]
 STYLE = ROOT / "docs" / "style.md"
+CHANGELOG = ROOT / "CHANGELOG.md"
 PAGES = [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md",
          *sorted((ROOT / "notebooks").glob("*.py"))]
 
 
-def unwanted(style: str) -> dict[str, str]:
-    """The words of the table -> what to write in their place."""
-    rows = re.findall(r"^\| (.+) \| (.+) \|$", style, re.MULTILINE)
-    return {word: right for left, right in rows if left not in ("not", "---") for word in left.split(", ")}
+TEMPLATES = [path for folder in ("templates", "symdyn") for path in sorted((ROOT / folder).rglob("*"))
+             if path.suffix in {".jinja", ".h", ".c", ".cpp", ".hpp", ".js", ".md", ".toml"}]
+
+
+def unwanted(style: str, title: str = "not") -> dict[str, str]:
+    """The words of the table with a title -> what to write in their place."""
+    rows = style.partition(f"\n| {title} | but |\n| --- | --- |\n")[2].partition("\n\n")[0].splitlines()
+    cells = [row.strip("| ").split(" | ") for row in rows]
+    return {word: right for left, right in cells for word in left.split(", ")}
 
 
 def prose(path: Path) -> Iterator[tuple[int, str]]:
-    """Lines of text with their numbers: of a page without its code, of a notebook its markdown, of a module its docstrings."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    """Lines of text with their numbers: of a page without its code, of the changelog its newest section, of a notebook its
+    markdown; of a module its docstrings, comments, messages and names of tests; of other files all."""
+    text = path.read_text(encoding="utf-8")
+    lines = text.splitlines()
+    if path.name == CHANGELOG.name:
+        lines = "\n## ".join(text.split("\n## ")[:2]).splitlines()
     if path.suffix == ".md":
         yield from _outside_code(lines)
     elif path.is_relative_to(ROOT / "notebooks"):
         yield from ((k, line) for k, line in enumerate(lines, 1) if line.startswith("# "))
+    elif path.suffix == ".py":
+        yield from sorted(_of_module(text))
     else:
-        for node in ast.walk(ast.parse("\n".join(lines))):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
-                first = node.body[0]
-                yield from ((k, lines[k - 1]) for k in range(first.lineno, (first.end_lineno or 0) + 1))
+        yield from enumerate(lines, 1)
+
+
+def _of_module(text: str) -> Iterator[tuple[int, str]]:
+    """Messages are texts of more than one word that are no docstrings; those of tests are data."""
+    tests = re.search("^def test_", text, re.MULTILINE) is not None
+    tree, lines, documented = ast.parse(text), text.splitlines(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
+            first = node.body[0]
+            documented |= set(ast.walk(first))
+            yield from ((k, lines[k - 1]) for k in range(first.lineno, (first.end_lineno or 0) + 1))
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            yield node.lineno, node.name.replace("_", " ")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in documented and not tests:
+            yield from ((node.lineno, line) for line in node.value.splitlines() if " " in line)
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string
 
 
 def _outside_code(lines: list[str]) -> Iterator[tuple[int, str]]:
@@ -113,21 +143,38 @@ def test_a_clumsy_sentence_is_found(tmp_path: Path) -> None:
 
 
 def test_pages_and_notebooks_use_the_words_of_the_field() -> None:
-    assert found(PAGES, unwanted(STYLE.read_text(encoding="utf-8"))) == []
+    assert found([*PAGES, CHANGELOG], unwanted(STYLE.read_text(encoding="utf-8"))) == []
 
 
-def test_docstrings_use_the_words_of_the_field() -> None:
-    modules = sorted((ROOT / "symdyn").rglob("*.py"))
-    assert found(modules, unwanted(STYLE.read_text(encoding="utf-8"))) == []
+@pytest.mark.parametrize("folder", ["symdyn", "tests"])
+def test_modules_use_the_words_of_the_field(folder: str) -> None:
+    """In docstrings, comments and messages; in names of tests."""
+    assert found(sorted((ROOT / folder).rglob("*.py")), unwanted(STYLE.read_text(encoding="utf-8"))) == []
+
+
+def test_templates_use_the_words_of_the_field() -> None:
+    assert found(TEMPLATES, unwanted(STYLE.read_text(encoding="utf-8"))) == []
+
+
+def test_tables_of_words() -> None:
+    style = ("Text\n\n| not | but |\n| --- | --- |\n| a, b | c |\n| d | e, f |\n\n"
+             "| not in names | but |\n| --- | --- |\n| g | h |\n")
+    assert unwanted(style) == {"a": "c", "b": "c", "d": "e, f"} and unwanted(style, "not in names") == {"g": "h"}
 
 
 def test_an_unwanted_word_is_found(tmp_path: Path) -> None:
-    """In a page outside of code, and in a docstring."""
-    page, module = tmp_path / "page.md", tmp_path / "module.py"
-    page.write_text("A value told\n\n```python\ntold = 1\n```\nand `told`.\n", encoding="utf-8")
-    module.write_text('"""Begins anew."""\ntold = 1\n', encoding="utf-8")
-    assert found([page, module], {"told": "reports", "anew": "again"}) == ["page.md:1: 'told'; write: reports",
-                                                                        "module.py:1: 'anew'; write: again"]
+    """In a page outside of code, in a docstring, a comment and a message of a module, in the name of a test but not in its data,
+    in a template, and in the newest section of a changelog."""
+    texts = {"page.md": "A value told\n\n```python\ntold = 1\n```\nand `told`.\n",
+             "module.py": '"""Begins anew."""\ntold = 1  # was told\nraise Error(f"{told} is told")\n',
+             "test_one.py": 'def test_it_is_told():\n    run("it told")\n',
+             "run.h": "// Begin anew.\n", "CHANGELOG.md": "# Changes\n\n## 2\n\ntold\n\n## 1\n\nanew\n"}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert found([tmp_path / name for name in texts], {"told": "reports", "anew": "again"}) == [
+        "page.md:1: 'told'; write: reports", "module.py:1: 'anew'; write: again", "module.py:2: 'told'; write: reports",
+        "module.py:3: 'told'; write: reports", "test_one.py:1: 'told'; write: reports", "run.h:1: 'anew'; write: again",
+        "CHANGELOG.md:5: 'told'; write: reports"]
 
 
 def prose_faults(texts: dict[str, str], folder: Path) -> list[str]:

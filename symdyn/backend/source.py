@@ -273,7 +273,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
-    # A file with the name of a standard module would be imported in its place by whatever runs beside it.
+    # A file with the name of a standard module would be imported in its place by whatever runs next to it.
     # The runtime in C has names that begin with symdyn_.
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
     written = [way for f in program.functions for way in f.ways]

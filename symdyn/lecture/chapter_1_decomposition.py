@@ -27,7 +27,7 @@ def _components() -> list[Formula]:
         Formula("r_PE", x * i + y * j + z * k, in_n, line=1142, latex="{}^n r_{P/E}"),
         Formula("r_PE in the plane", sp.Matrix([x, y]), in_n[:2, 0], line=1163, latex="{}^n r_{P/E}"),
         Formula("arrow from components in the b-frame", (r_x * i_b + r_y * j_b)[:2, 0], in_n[:2, 0], line=1166, renamed=own),
-        Formula("r_PO beside r_PE", sp.Matrix([r_x, r_y]), P.position(of=shifted)[:2, 0], line=1166, renamed=own,
+        Formula("r_PO next to r_PE", sp.Matrix([r_x, r_y]), P.position(of=shifted)[:2, 0], line=1166, renamed=own,
                 conventions=[common], latex="{}^b r_{P/O}"),
     ]
 

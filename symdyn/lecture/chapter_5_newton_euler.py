@@ -184,7 +184,7 @@ def torques() -> list[Formula]:
 CASES = (
     Case("two-link-arm-accelerations", "Accelerations of the centres of mass of two links", Slide("5.5", APPLICATION, 7667),
          accelerations, remarks=[
-             Remark("The components beside the acceleration of O_2 are those of r_O2/E; r_G1/E is printed.", 7708, (8048,)),
+             Remark("The components next to the acceleration of O_2 are those of r_O2/E; r_G1/E is printed.", 7708, (8048,)),
              Remark("The equation holds, but the next step needs angular accelerations: one dot on every omega, not two.", 7716,
                     (8056,))]),
     Case("two-link-arm-resultants", "Resultant force and moment at the centre of mass of each link",

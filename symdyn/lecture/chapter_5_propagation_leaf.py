@@ -53,7 +53,7 @@ def _link_2() -> list[Formula]:
         row(of, "f_2", 10409, "f2 = I2 a2 + p2", f_2, (10430, 10450, 10470, 10484, 10503, 10526, 10556, 10582, 10609, 10637)),
         row(of, "tau_2", 10317, "tau_2 = S2^T f2", torque,
             (10342, 10363, 10384, 10413, 10432, 10452, 10472, 10486, 10505, 10528, 10562, 10584, 10615, 10643)),
-        row(of, "f_1 beside the equations for link 2", 10319, "f1 = I1 (1X0 a0 + S1 q1'' + c1) + p1", arm.f_1,
+        row(of, "f_1 next to the equations for link 2", 10319, "f1 = I1 (1X0 a0 + S1 q1'' + c1) + p1", arm.f_1,
             (10344, 10365, 10386, 10415, 10434, 10669), [missing]),
         row(of, "f_2 with a_2 put in", 10450, "f2 = I2 (2X1 a1 + S2 q2'' + c2) + p2", f_2, (10470,)),
         row(of, "tau_2 with f_2 put in", 10472, "tau_2 = S2^T (I2 (2X1 a1 + S2 q2'' + c2) + p2)", torque,

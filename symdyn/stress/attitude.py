@@ -89,7 +89,7 @@ def _angles(tested: SystemUnderTest, kind: str, d: float, sol: Any, truth: np.nd
                    "the motion is right" if sol.n_steps < 100 * usual else "the motion is right, at many times the usual steps, "
                    f"which is {'warned' if named else 'not warned'}")
     return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", result, bound, origin,
-               DEGRADE if named else FAIL, "digits are lost near gimbal lock, and a warning says so" if named else
+               DEGRADE if named else FAIL, "digits are lost near gimbal lock, with a warning" if named else
                "digits are lost near gimbal lock without a word")
 
 

@@ -80,7 +80,7 @@ def stands_still(tested: SystemUnderTest, x: np.ndarray) -> bool:
     n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
     least = np.array([longest if known.get(name) == "m" else 1.0 for name in module.metadata.x])
     change = np.ptp(x, axis=0) <= STILL * np.maximum(scales_of(tested, x), least)
-    return bool(np.delete(change, slice(n_q, n_q + n_u)).all())  # rounding alone gives speeds beside those that are zero
+    return bool(np.delete(change, slice(n_q, n_q + n_u)).all())  # rounding alone gives speeds next to those that are zero
 
 
 def demand_motion(tested: SystemUnderTest, sol: Solution) -> None:
@@ -96,7 +96,7 @@ def local_error(tested: SystemUnderTest, end: float, rtol: float, scales: np.nda
     n = len(every.t) - 1
     worst = 0.0
     for k in np.unique(np.linspace(0, n - 1, MEASURED).astype(int)):
-        # By the same method: "auto" might take an explicit one where stiff motion begins beside its slow part.
+        # By the same method: "auto" might take an explicit one where stiff motion begins with its slow part.
         sharp = tested.run((every.t[k], every.t[k + 1]), every.x[k], rtol=FINE, atol=FINE * scales, steps=True,
                            max_step=(every.t[k + 1] - every.t[k]) / 4, method=every.method)
         if sharp.success:

@@ -36,7 +36,7 @@ from symdyn.stress.system_under_test import EPS, SystemUnderTest, evaluated
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
-# What is zero on the constraints is looked at beside them, too: this far, of the usual size.
+# Quantities that are zero on the constraints are evaluated off them, too: at this distance, of the usual size.
 NEARBY, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
 # States, fewer of long equations (so many operations at 32 digits altogether) and in the short form.
 STATES, WORK, FEW = 1000, 1.5e6, 24
@@ -113,7 +113,7 @@ def off_constraints(tested: SystemUnderTest, where: States) -> States:
 
 
 def towards_lost_rank(tested: SystemUnderTest, where: States) -> States:
-    """The same states and, where some of them lie next to a position of lost rank, more around these at smaller distances."""
+    """The same states and, where some of them lie next to a singular configuration, more around these at smaller distances."""
     near = np.flatnonzero(smoothed(tested, "rhs", where.t, where.x))[:LANDMARKS]
     if not len(near):
         return where
@@ -149,7 +149,7 @@ def rounding(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     operations = sum(function_tape(tested.equations, name).operations for name in names)
     n = FEW if short else int(np.clip(WORK / max(operations, 1), FEW, STATES))
     where = towards_lost_rank(tested, states(tested, n))
-    # Constraints that depend on others contradict them beside.
+    # Off the constraints, those that depend on others contradict them.
     near = off_constraints(tested, where) if tested.constrained and not redundant(tested, where.t, where.x) else where
     statements = emitted(tested, names)
     measured = [Measured(tested, name, near if name in NEARBY else where, None, statements[name]) for name in names]

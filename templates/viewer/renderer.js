@@ -113,7 +113,7 @@ class Renderer {
         gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     }
 
-    // Part `which` of `many` beside each other.
+    // Part `which` of `many` next to each other.
     part(which, many, camera, light) {
         const gl = this.gl, width = this.canvas.width / many;
         this.flush();

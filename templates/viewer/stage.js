@@ -1,4 +1,4 @@
-// What is seen: a camera that turns, the solids of one mechanism or of several beside each other, names under the pointer.
+// The visible scene: a camera that turns, the solids of one mechanism or of several next to each other, names under the pointer.
 const FIELD = 0.6;
 // Lengths of a mechanism beyond which the camera goes along with a motion.
 const FAR = 8;
@@ -362,7 +362,7 @@ class Stage {
         return [at, f, n, this.forceScale * Math.min(n * scale, longest ?? Infinity)];
     }
 
-    // Without light and shade: colours are what arrows are told apart by.
+    // Without light and shade: arrows are distinguished by their colours.
     arrow(scene, a, way, color, name, heads = 1) {
         const long = size(way), r = 0.007 * this.length, share = Math.min(5 * r / long, 0.5 / heads), b = add(a, way);
         this.rod(scene, a, add(b, way, -heads * share), [r, r], color, name, "rod", 2);

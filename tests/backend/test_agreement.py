@@ -27,7 +27,7 @@ STATES = 4
 
 
 class Routes(NamedTuple):
-    """Equations beside units with all of their functions."""
+    """Equations next to units with all of their functions."""
 
     equations: Any
     functions: list[str]

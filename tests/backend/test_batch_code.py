@@ -158,7 +158,7 @@ def test_standalone_files_take_it_on_request() -> None:
     assert "pendulum_rhs_batch(" in source.files["pendulum.h"]
 
 
-def test_arguments_of_calls_can_be_told_wrongly(tmp_path: Any) -> None:
+def test_arguments_of_calls_may_be_declared_wrongly(tmp_path: Any) -> None:
     folder = tmp_path / "odd"
     folder.mkdir()
     (folder / "dialect.toml").write_text(

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]
 ROOT = Path(__file__).parents[2]
-# What compilers call without being told: copies of structs, sine with cosine, their own guards.
+# Functions that compilers call by themselves: copies of structs, sine with cosine, their own guards.
 OF_THE_COMPILER = {"memcpy", "memset", "sincos", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
 
 
@@ -36,7 +36,7 @@ def run(*command: Any, folder: Path) -> str:
 
 
 def check(folder: Path, name: str) -> str:
-    """Build the example beside the source and run it."""
+    """Build the example next to the source and run it."""
     run("gcc", *STRICT, "-o", "check", "main.c", f"{name}.c", "-lm", folder=folder)
     return run("./check", folder=folder)
 

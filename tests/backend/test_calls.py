@@ -126,7 +126,7 @@ def test_what_vanishes_by_the_parameters_is_no_fault(backend: str) -> None:
 
 
 @both
-def test_the_reason_is_told_where_both_ways_fail(backend: str) -> None:
+def test_the_reason_is_reported_where_both_ways_fail(backend: str) -> None:
     q, p = sd.coordinates("q p")
     I, k = sd.parameters("I k")
     s = sd.System("loose", planar=True)
@@ -235,7 +235,7 @@ def dialect_without_calls(tmp_path: Path, change: Callable[[str], str]) -> Path:
     return folder
 
 
-def test_a_backend_without_calls_says_so(tmp_path: Path) -> None:
+def test_a_backend_without_calls_reports_it(tmp_path: Path) -> None:
     dialect_without_calls(tmp_path, lambda text: re.sub(r"\[call\].*?\n\n", "", text, flags=re.DOTALL))
     with pytest.raises(SymdynError, match=r"calls? the numeric algorithm symdyn_\w+, which the backend numpy does not have; "
                                           r"add \[call\] to its dialect.toml, and the algorithm to its templates"):
@@ -243,7 +243,7 @@ def test_a_backend_without_calls_says_so(tmp_path: Path) -> None:
     assert emit(equations("four_bar"), "numpy", ("mass_matrix", "C"), templates=tmp_path).files
 
 
-def test_a_backend_without_the_algorithm_says_so(tmp_path: Path) -> None:
+def test_a_backend_without_the_algorithm_reports_it(tmp_path: Path) -> None:
     folder = dialect_without_calls(tmp_path, lambda text: text)
     folder.rename(tmp_path / "other")
     model = tmp_path / "other" / "model.py.jinja"

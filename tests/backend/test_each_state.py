@@ -72,7 +72,7 @@ def mixed(name: str) -> np.ndarray:
 @pytest.mark.parametrize("function", FUNCTIONS)
 @pytest.mark.parametrize("name", LOST)
 def test_every_state_gets_what_it_gets_alone(name: str, function: str) -> None:
-    """To the last bit, beside one that is no number, too: for the same numbers NumPy gives the same bits in any array."""
+    """To the last bit, next to one that is no number, too: for the same numbers NumPy gives the same bits in any array."""
     module, x = written(name), mixed(name)
     x[21, 0] = np.nan
     good = np.delete(np.arange(len(x)), 21)
@@ -152,7 +152,7 @@ def turning() -> np.ndarray:
     return x
 
 
-def test_the_error_tells_which_states_fail() -> None:
+def test_the_error_reports_which_states_fail() -> None:
     module, x = written_wheels(), turning()
     for function in ("rhs", "lam", "reactions"):
         with pytest.raises(module.SingularError, match=WHY) as caught:
@@ -323,7 +323,7 @@ def test_an_algorithm_that_divides_by_zero_fails_there() -> None:
 
 
 def test_a_function_of_the_user_that_stops_for_all_is_tried_for_each() -> None:
-    """Where it raises an error of its own, nothing tells at which states."""
+    """Where it raises an error of its own, nothing shows at which states."""
     def moody(v: np.ndarray) -> np.ndarray:
         if (v > 0.5).any():
             raise ValueError("too far")

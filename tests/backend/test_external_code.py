@@ -1,4 +1,4 @@
-"""Functions of the user in generated code: the same numbers as expressions, files that stand alone, failures that are told."""
+"""Functions of the user in generated code: the same numbers as expressions, files that stand alone, reports of failures."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_constraint_is_differentiated_twice() -> None:
 
 
 def test_proofs_look_at_functions() -> None:
-    """At 30 digits where a function has them, in floating point where not, which is told; and a wrong derivative is found."""
+    """At 30 digits where a function has them, in floating point where not, which is reported; and a wrong derivative is found."""
     verification = equations("function", "embedding").verify(states=1)
     rows = {check.name: check for check in verification.checks}
     assert verification.passed
@@ -167,7 +167,7 @@ def sled(force: Callable[..., Any], scale: Any = 1) -> sd.System:
 
 
 @both
-def test_where_it_fails_a_simulation_stops_and_tells(backend: str) -> None:
+def test_where_it_fails_a_simulation_stops_and_reports_it(backend: str) -> None:
     """v_dot = 1 + v reaches 1/2 at t = log 1.5."""
     fails = sled(BOUNDED).embedding().compile(backend=backend)
     with pytest.warns(SimulationWarning, match=r"sled: stopped at t = 0\.40\d+: .*the table of bounded ends at 0.5.*; the state "
@@ -231,7 +231,7 @@ def two_numpy(v):
 # -- backends
 
 
-def test_a_backend_without_a_text_is_told() -> None:
+def test_a_backend_without_a_text_is_reported() -> None:
     only_c = sd.External("f", ["v"], c="static int f(const double *in, double *out)\n{\n    out[0] = in[0];\n    return 0;\n}")
     only_python = sd.External("f", ["v"], python=inverse_numpy)
     with pytest.raises(SymdynError, match=r"f\(v\) has no text for the backend numpy, only for c; pass python= to sd.External"):
@@ -267,7 +267,7 @@ def test_a_backend_of_ones_own(tmp_path: Path) -> None:
         emit(eq, "third", templates=tmp_path)
 
 
-def test_a_dialect_without_calls_is_told(tmp_path: Path) -> None:
+def test_a_dialect_without_calls_is_reported(tmp_path: Path) -> None:
     shutil.copytree(Path(__file__).parents[2] / "templates" / "numpy", tmp_path / "numpy")
     dialect = tmp_path / "numpy" / "dialect.toml"
     dialect.write_text(re.sub(r"\[call\].*?\n\n", "", dialect.read_text(), flags=re.DOTALL))
@@ -275,7 +275,7 @@ def test_a_dialect_without_calls_is_told(tmp_path: Path) -> None:
         emit(sled(BOUNDED).embedding(), "numpy", ("rhs",), templates=tmp_path)
 
 
-def test_names_that_clash_are_told() -> None:
+def test_names_that_clash_are_reported() -> None:
     twice = sd.External("bounded", ["v"], python=inverse_numpy)
     with pytest.raises(SymdynError, match=r"two functions that differ are called bounded: bounded\(v\) and bounded\(v\); give "):
         emit(sled(lambda v: BOUNDED(v) + twice(v)).embedding(), "numpy")
@@ -348,7 +348,7 @@ def test_only_what_is_called_is_there_and_once() -> None:
 
 
 @pytest.mark.parametrize("backend", ["c", "numpy"])
-def test_the_head_tells_and_the_hash_covers(backend: str) -> None:
+def test_the_head_lists_and_the_hash_covers(backend: str) -> None:
     def made(function: sd.External) -> str:
         return next(iter(emit(sled(lambda v: function(v, 2)[0]).embedding(), backend).files.values()))
 

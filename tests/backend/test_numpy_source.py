@@ -76,7 +76,7 @@ def test_selftest_notices_a_wrong_number(derived: Callable[..., Any], write: Cal
     assert done.returncode == 1 and "WRONG" in done.stdout and "results are wrong" in done.stdout
 
 
-def test_run_without_arguments_tells_what_it_is(derived: Callable[..., Any], write: Callable[..., Path]) -> None:
+def test_run_without_arguments_prints_what_it_is(derived: Callable[..., Any], write: Callable[..., Path]) -> None:
     done = run_alone(write(derived("pendulum"), "numpy") / "pendulum.py")
     assert done.returncode == 0 and "q1  [rad]" in done.stdout and "--selftest" in done.stdout
 

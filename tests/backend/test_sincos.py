@@ -109,7 +109,7 @@ def test_small_angles_are_their_sines() -> None:
     assert (found[0] == x).all() and (found[1] == 1).all()
 
 
-def test_large_angles_beside_small_ones() -> None:
+def test_large_angles_together_with_small_ones() -> None:
     """One large angle does not change the bits of the others."""
     unit = loaded(both)
     x = np.array([0.3, 1e22, -2.5, 1.7976931348623157e308, 7.0])

@@ -90,7 +90,7 @@ def test_nodes_are_sums_of_rows(method: Method) -> None:
 
 @pytest.mark.parametrize(("name", "order", "estimate", "between"), [("bs54", 5, 4, 4), ("dop853", 7, 5, 6)])
 def test_order_conditions(name: str, order: int, estimate: int, between: int) -> None:
-    """Of the solution, of the embedded solution, of the dense output; of order 8 the measured order tells."""
+    """Of the solution, of the embedded solution, of the dense output; order 8 is shown by the measured order."""
     method = METHODS[name]
     t = method.tableau
     third = {k: -v for k, v in (t.second or {}).items()}  # b + second is the difference to it

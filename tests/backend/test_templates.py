@@ -76,7 +76,7 @@ def test_javascript_gives_the_numbers_of_the_module(derived: Callable[..., Any],
 
 
 @NODE
-def test_javascript_refuses_a_singular_mass_matrix(derived: Callable[..., Any], folder: Path, tmp_path: Path) -> None:
+def test_javascript_rejects_a_singular_mass_matrix(derived: Callable[..., Any], folder: Path, tmp_path: Path) -> None:
     (path,) = write_source(emit(derived("pendulum"), "ecmascript", templates=folder), tmp_path)
     printed = node(path, "try { m.prologue({ p: [9.81, 1, 0] }); } catch (e) { console.log(e.name, e.message); }")
     assert printed == "RangeError the mass matrix is not positive definite at q1_dot\n"

@@ -19,7 +19,7 @@ from symdyn.runtime.building.compiler import LINUX
 
 pytestmark = pytest.mark.skipif(not LINUX, reason="processes of their own are forked")
 MOTION = (None, None, None, None)
-# Prepares in a library that lets no other thread of Python run, with a program of its own beside, and is ended from outside.
+# Prepares in a library that lets no other thread of Python run, with a program of its own as a child, and is ended from outside.
 SCRIPT = """
 import ctypes, os, subprocess, sys, time
 from symdyn.bench.work.against.apart import Apart

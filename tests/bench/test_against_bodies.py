@@ -76,7 +76,7 @@ def run(peer: Peer, case: tuple[Any, Any, np.ndarray, np.ndarray], end: float, t
     runner = peer.prepare(equations, params, x0, end, system)
     seconds, evaluations, x = runner(tolerance)
     assert seconds > 0 and evaluations > 4
-    if tolerance > 1e-5:  # each run starts anew
+    if tolerance > 1e-5:  # each run starts again
         again = runner(tolerance)
         assert again[1] == evaluations and np.array_equal(again[2], x)
     return float(np.linalg.norm(x - ours) / np.linalg.norm(ours))
@@ -133,7 +133,7 @@ def test_description_for_pinocchio(case: str, request: pytest.FixtureRequest) ->
 
 
 def test_pinocchio_under_casadi(tree: tuple[Any, Any, np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a function in place of the compiled one: forces and orders are right, and wrong accelerations are refused."""
+    """With a function in place of the compiled one: forces and orders are right, and wrong accelerations are rejected."""
     pytest.importorskip("casadi")
     adams = against.peers("pinocchio")[0]
     system, equations, params, x0 = tree

@@ -48,7 +48,7 @@ class Motion:
         for tolerance in tolerances:
             seconds, evaluations, x = run(tolerance)
             assert 0 < seconds < 60 and isinstance(evaluations, int) and evaluations >= 0
-            if not errors:  # each run starts anew
+            if not errors:  # each run starts again
                 again = run(tolerance)
                 assert again[1] == evaluations and np.array_equal(again[2], x)
             errors.append(float(np.linalg.norm(x - self.x) / np.linalg.norm(self.x)))
@@ -124,7 +124,7 @@ def test_ida_is_for_constraints(pendulum: Motion) -> None:
 
 
 @needs_c
-def test_what_sundials_refuses(pendulum: Motion) -> None:
+def test_what_sundials_rejects(pendulum: Motion) -> None:
     adams, _ = installed("cvode")
     run = adams.prepare(pendulum.equations, pendulum.params, np.full(4, np.nan), 1.0)
     with pytest.raises(Failed, match="CVode of SUNDIALS failed with -"):

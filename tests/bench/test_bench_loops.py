@@ -60,7 +60,7 @@ def test_stays_on_its_constraints(label):
 
 
 @needs_c
-def test_a_bound_that_is_missed_is_told():
+def test_a_bound_that_is_missed_is_reported():
     row = measure(dataclasses.replace(CASES["skate"], bounds={"error_q": 1e-20, "error_u": 1e-9}), repeats=1, long=0.5)
     assert row.misses == ("MISSED error_q <= 1e-20",)
     assert str(row).endswith("MISSED error_q <= 1e-20")

@@ -90,7 +90,7 @@ def test_what_is_not_a_number_is_no_agreement(context):
     assert distance([[context.mpf(3)]], [[context.mpf(2)]], 1, 0) == 0.5
 
 
-def test_the_method_tells_where_it_cannot_go_on(context):
+def test_the_method_reports_where_it_cannot_go_on(context):
     with pytest.raises(ArithmeticError, match="step size vanishes"):
         integrate(lambda t, x: [x[0]**2], (context.mpf(0), context.mpf(2)), [context.mpf(1)], context.mpf(10)**-12,
                   [slice(0, 1)], context)

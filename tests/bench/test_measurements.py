@@ -1,4 +1,4 @@
-"""The words after `symdyn bench`: what each is given, what it returns, what is told when it is asked wrongly."""
+"""The words after `symdyn bench`: arguments, results, and reports of wrong arguments."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_word_is_in_help_and_takes_what_its_function_takes(word: str, capsys: 
 
 
 @pytest.mark.parametrize("arguments", [["bench"], ["bench", "published"]])
-def test_help_tells_what_is_compared_and_what_a_budget_counts(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_explains_comparisons_and_what_a_budget_counts(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main([*arguments, "--help"])
     said = " ".join(capsys.readouterr().out.split())
@@ -92,7 +92,7 @@ def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypat
     (["published", "--output", f"{__file__}/there"], "test_measurements.py is a file, not a folder"),
     (["pendulum", "--methods", "bs54", "--steps", "0.1"], "none of the methods bs54 has steps of one length; add gauss"),
 ])
-def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_arguments_are_reported(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", *arguments]) == 2
     assert said in capsys.readouterr().err
 
@@ -100,13 +100,13 @@ def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, capsys: 
 @pytest.mark.parametrize("arguments, said", [(["growth", "--sizes", "many"], "invalid int value: 'many'"),
                                              (["extended"], "the following arguments are required: NAME"),
                                              (["turbine", "pendulum"], "unrecognized arguments: pendulum")])
-def test_what_cannot_be_read_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_read_is_reported(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["bench", *arguments])
     assert said in capsys.readouterr().err
 
 
-def test_figures_beside_their_bounds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_with_their_bounds(capsys: pytest.CaptureFixture[str]) -> None:
     def small() -> Iterator[tuple[str, float, str, str]]:
         yield "within", 1.5, "s", "< 2"
         yield "on the edge", 2.0, "s", "< 2"
@@ -137,7 +137,7 @@ def test_references_are_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, ca
     assert capsys.readouterr().out == "double_pendulum: it would take too long\n" and list(store.stored()) == ["pendulum"]
 
 
-def test_stress_is_told_what_is_missing_before_anything_is_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_stress_reports_what_is_missing_before_anything_is_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text("import symdyn as sd\n\n\ndef system():\n    found = sd.systems.get('pendulum')\n"
                     "    found.defaults = dict(list(found.defaults.items())[1:])\n    return found\n")

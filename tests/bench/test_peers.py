@@ -99,7 +99,7 @@ def test_every_number_of_the_turbine_is_a_parameter() -> None:
     assert len(turbine_tree().check().parameters) == 19
 
 
-def test_what_peers_are_not_told() -> None:
+def test_what_peers_cannot_describe() -> None:
     with pytest.raises(SymdynError, match="has loads or a moving ground; peers are compared under gravity alone"):
         describe(systems.cart_pole().check())
     with pytest.raises(SymdynError, match=r"joint .* is spherical; the peers take .* free ones in frames that are not turned"):
@@ -257,7 +257,7 @@ def test_missing_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 @needs_c
 @pytest.mark.slow
 @pytest.mark.sweep
-def test_casadi_beside_symdyn() -> None:
+def test_casadi_compared_with_symdyn() -> None:
     """The same accelerations, and CasADi's operations as they were published with the bounds; building takes a minute."""
     pytest.importorskip("casadi", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
     pytest.importorskip("pinocchio", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
@@ -270,7 +270,7 @@ def test_casadi_beside_symdyn() -> None:
 @pytest.mark.slow
 @pytest.mark.sweep
 @pytest.mark.parametrize("name", ["n_link_pendulum(5)", "puma560"])
-def test_derivatives_beside_peers(name: str) -> None:
+def test_derivatives_compared_with_peers(name: str) -> None:
     """The same derivatives by CasADi's C; Pinocchio's C++, which takes minutes to build, takes part in the command alone."""
     pytest.importorskip("casadi", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
     pytest.importorskip("pinocchio", reason="the peers are not installed; run: pip install 'symdyn[peers]'")

@@ -136,7 +136,7 @@ def test_a_faster_program_is_a_missed_bound():
     assert cut.missed() == [] and "not decided, the budget was used up" in str(cut) and cut.record()["unfinished"]
 
 
-def test_what_a_budget_leaves_is_told(tmp_path, capsys):
+def test_what_a_budget_leaves_is_reported(tmp_path, capsys):
     assert published.run(["A01", "A05"], ["heyoka"], budget=1e-9, folder=tmp_path) == 2
     assert "the budget of 1e-09 s is used up: A01, A05 were not begun" in capsys.readouterr().out
 
@@ -255,7 +255,7 @@ def test_fingerprint_has_the_programs_that_are_there_and_the_code(monkeypatch):
     assert len(set(marks)) == 3 and marks[2] == published._fingerprint(_short(), ["other"], 5)
 
 
-def test_digits_of_the_stored_motion_are_told():
+def test_digits_of_the_stored_motion_are_reported():
     assert CASES["A03 q"].reference(None)[1] == f"extended precision, {extended.known('andrews_squeezer')['digits']} digits"
 
 
@@ -305,7 +305,7 @@ def test_other_programs_come_before_what_takes_long_to_compile(monkeypatch):
                      "symdyn taylor"]
 
 
-def test_time_is_kept_for_what_was_found_and_the_rest_is_told(monkeypatch):
+def test_time_is_kept_for_what_was_found_and_the_rest_is_reported(monkeypatch):
     given = []
     monkeypatch.setattr(published, "search", lambda line, case, exact, until: given.append(until))
     begun = time.perf_counter()
@@ -318,7 +318,7 @@ def test_time_is_kept_for_what_was_found_and_the_rest_is_told(monkeypatch):
     assert text.count("not timed") == 2
 
 
-def test_an_interrupt_tells_that_it_goes_on(monkeypatch, tmp_path, capsys):
+def test_an_interrupt_reports_that_it_goes_on(monkeypatch, tmp_path, capsys):
     def stopped(*_):
         raise KeyboardInterrupt
 

@@ -1,4 +1,4 @@
-"""Tapes in C with numbers of 113 binary digits, beside mpmath."""
+"""Tapes in C with numbers of 113 binary digits, compared with mpmath."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert path.read_text() == before and [p.name for p in path.parent.iterdir()] == ["references.json"]
 
 
-def test_files_that_cannot_be_written_are_told_before_anything_runs(tmp_path):
+def test_files_that_cannot_be_written_are_reported_before_anything_runs(tmp_path):
     other = tmp_path / "other.json"
     other.write_text("[1]")
     with pytest.raises(ArgumentError, match=r"other.json holds something else, .* --store FILE"):
@@ -194,7 +194,7 @@ def test_files_that_cannot_be_written_are_told_before_anything_runs(tmp_path):
 
 @pytest.mark.parametrize("arguments", [["references", "pendulum", "--digits", "6"],
                                        ["extended", "pendulum_absolute", "--t", "0.1", "--digits", "10"]])
-def test_commands_store_where_they_are_told(arguments, tmp_path, capsys):
+def test_commands_store_into_the_file_requested(arguments, tmp_path, capsys):
     own = (store.STORE.read_bytes(), kept.read(store.STORE))
     path = tmp_path / "mine.json"
     kept.put(path, "another", {"x": [1]})

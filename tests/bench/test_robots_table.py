@@ -1,4 +1,4 @@
-"""`symdyn bench robots`: a table, and what is told where there is none."""
+"""`symdyn bench robots`: a table, and the report where there is none."""
 
 from __future__ import annotations
 

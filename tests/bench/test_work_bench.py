@@ -127,7 +127,7 @@ def test_more_tolerances_to_a_decade_begin_looser():
         checked([about], tolerances=[1e-4], per_decade=4)
 
 
-def test_table_tells_all(measured):
+def test_table_has_all(measured):
     text = measured[0].table()
     assert "reference: closed form, 15.9 digits" in text and "t=0.4" in text
     assert text.endswith("of poses (q) and velocities (u) of all bodies")  # absolute coordinates take part
@@ -167,7 +167,7 @@ def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
     monkeypatch.setattr(plan, "own", lambda *arguments: more.append(original(*arguments)) or more[-1])
     (tmp_path / "long").mkdir()
     data = json.loads((tmp_path / "results.json").read_text())
-    data["timed"], data["rows"][0]["took"] = "2001-02-03 04:05", 1e9  # too long to time it anew
+    data["timed"], data["rows"][0]["took"] = "2001-02-03 04:05", 1e9  # too long to time it again
     (tmp_path / "long" / "results.json").write_text(json.dumps(data))
     mixed = run(about, asked, tmp_path / "long")
     assert len(more) == 1 and not mixed.unfinished and {r.tolerance for r in mixed.earlier} == {r.tolerance for r in made}
@@ -176,7 +176,7 @@ def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
     assert told in mixed.table() and mixed.table().count("^") == 3
     assert [row["earlier"] for row in mixed.record()["rows"]].count("2001-02-03 04:05") == 2
     assert told in (mixed.save(tmp_path / "long")[-1]).read_text()
-    # What is cheap is timed anew, beside the others: the times of a row are of one run.
+    # Cheap runs are timed again, with the others: the times of a row are of one run.
     result = run(about, asked, tmp_path)
     assert len(more) == 4 and [r.tolerance for r in result.rows] == [1e-4, 1e-7, 1e-10] and not result.earlier
     assert {r.key: r.error for r in made}.items() <= {r.key: r.error for r in result.rows}.items()
@@ -331,14 +331,14 @@ def test_two_runs_that_agree_are_all_there_is_time_for():
     assert quick.how.startswith("embedding with dop853 at 1e-12 and embedding with Radau at 1e-12 differ by ")
 
 
-def test_budget_is_honoured_and_told(tmp_path):
+def test_budget_is_honoured_and_reported(tmp_path):
     about = named_case("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding"], budget=1e-9, **ASKED))
     assert result.rows == [] and result.unfinished.startswith("3 of 3 runs were not made within the budget of 1e-09 s, which ")
     assert "unfinished: 3 of 3 runs" in result.table()
 
 
-def test_other_work_on_the_machine_is_told():
+def test_other_work_on_the_machine_is_reported():
     quiet, busy = Row("a", "b", 1e-6, seconds=1.2, least=1.0, repeats=5), Row("a", "b", 1e-6, seconds=3.0, least=1.0, repeats=5)
     assert (quiet.disturbed, quiet.time) == (False, 1.0) and (busy.disturbed, busy.time) == (True, 1.0)
     text = Benchmark("a", 1.0, [quiet, busy], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).table()
@@ -425,7 +425,7 @@ class _Missing(_Exact):
         return "it is not installed"
 
 
-def test_other_programs_run_beside(monkeypatch):
+def test_other_programs_run_for_comparison(monkeypatch):
     monkeypatch.setattr(against, "names", lambda: ["some"])
     monkeypatch.setattr(against, "peers", lambda name: (_Exact(), _Unfit(), _Broken(), _Missing()))
     about = named_case("pendulum", end=2.0)
@@ -512,14 +512,14 @@ def test_a_process_of_its_own_gives_what_this_one_gives():
     with pytest.raises(TooLong, match="its process was ended"):
         apart.timed(0, 1e-8, 9)
     apart = prepared(_Dying("later"), motion, [1.0], far, far)
-    for _ in range(2):  # it is told again
+    for _ in range(2):  # it is reported again
         with pytest.raises(Failed, match="its process died with code 3"):
             apart.timed(0, 1e-8, 9)
     with pytest.raises(TooLong, match="the budget was used up before it was prepared"):
         prepared(peer, motion, [1.0], 0.0, 0.0)
 
 
-def test_auto_is_measured_and_tells_what_it_chose(tmp_path, drawn):
+def test_auto_is_measured_and_reports_what_it_chose(tmp_path, drawn):
     result = sd.bench("pendulum", formulations=["embedding"], methods=["auto", "taylor"], tolerances=[1e-3, 1e-9], end=2.0,
                       repeats=1, folder=tmp_path)
     auto = [r for r in result.rows if r.method == "auto"]
@@ -539,7 +539,7 @@ def test_steps_need_a_method_that_has_them():
     assert checked([about], method_names=["dop853", "gauss"], steps=[0.1]).steps == checked([about], steps=[0.1]).steps == (0.1,)
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before(tmp_path, monkeypatch, capsys):
+def test_a_folder_that_cannot_be_written_is_rejected_before(tmp_path, monkeypatch, capsys):
     (tmp_path / "file").write_text("")
     with pytest.raises(ArgumentError, match=r"results cannot be written into .*file/deep: .*file is a file, not a folder"):
         sd.bench("pendulum", folder=tmp_path / "file" / "deep")
@@ -559,7 +559,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before(tmp_path, monkeypatch
 
 
 @pytest.mark.skipif(not LINUX, reason="there is no /proc")
-def test_what_no_one_may_write_into_is_refused_to_root_too(tmp_path):
+def test_what_no_one_may_write_into_is_rejected_for_root_too(tmp_path):
     assert "/proc is closed to writing" in resume.unwritable(Path("/proc/none"), ["results.json"])
     with pytest.raises(ArgumentError, match=r"references /proc/none/own.json cannot be written: /proc is closed to writing"):
         kept.writable(Path("/proc/none/own.json"), tmp_path / "own.json")
@@ -584,7 +584,7 @@ def test_end_and_folder_that_make_no_sense(asked, told):
         sd.bench("pendulum", **asked)
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_at_once():
     with pytest.raises(ArgumentError) as caught:
         sd.bench("pendulum", formulations=["embeding"], methods=["dop85", "x"], tolerances=[2.0, 1e-20, "a"], steps=[-1.0],
                  repeats=0, against=["heyok"], budget=-1.0, at=[50.0])
@@ -635,7 +635,7 @@ def test_equations_by_hand():
     assert [r.formulation for r in result.rows] == ["given"] and result.rows[0].error < 1e-4
 
 
-def test_lines_are_told_apart_by_colour_marker_and_line():
+def test_lines_differ_by_colour_marker_and_line():
     rows = [Row(f, m, 1e-6) for f in ("embedding", "recursive", "absolute") for m in ("a", "b", "c", "d")]
     styles = styles_of([*rows, Row("embedding", "other", 1e-6, peer=True)])
     assert len(styles) == 13 and len({(s["color"], s["marker"], str(s["linestyle"])) for s in styles.values()}) == 13
@@ -653,7 +653,7 @@ def test_command(tmp_path, capsys, drawn):
     assert (tmp_path / "out" / "mine" / "report.html").is_file()
 
 
-def test_command_tells_all_faults(capsys):
+def test_command_reports_all_faults(capsys):
     assert main(["bench", "nothing_of_the_kind", "--methods", "none", "--rtol", "3"]) == 2
     told = capsys.readouterr().err
     assert "no mechanism 'nothing_of_the_kind'" in told and "no method 'none'" in told and "the tolerance 3.0" in told
@@ -663,7 +663,7 @@ def test_command_tells_all_faults(capsys):
     assert "formulation" not in capsys.readouterr().err  # what it has is not known
 
 
-def test_parameters_without_values_are_told_with_what_to_do(tmp_path, capsys):
+def test_parameters_without_values_are_reported_with_what_to_do(tmp_path, capsys):
     (tmp_path / "mine.py").write_text("import symdyn as sd\n\n\ndef system():\n    found = sd.systems.get('pendulum')\n"
                                       "    found.defaults = dict(list(found.defaults.items())[1:])\n    return found\n")
     assert main(["bench", str(tmp_path / "mine.py"), "--rtol", "3", "--output", str(tmp_path / "out")]) == 2
@@ -682,7 +682,7 @@ def test_reference_prints():
     assert isinstance(Benchmark("a", 1.0, [], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).record(), dict)
 
 
-def test_without_a_compiler_methods_of_scipy_are_taken_and_that_is_told(monkeypatch):
+def test_without_a_compiler_methods_of_scipy_are_taken_and_that_is_reported(monkeypatch):
     for module in (methods, benchmark):
         monkeypatch.setattr(module, "find_compiler", lambda: None)
     about = named_case("pendulum", end=1.0)
@@ -692,7 +692,7 @@ def test_without_a_compiler_methods_of_scipy_are_taken_and_that_is_told(monkeypa
     assert [r.method for r in result.rows] == list(asked.methods) and result.table().count("there is no C compiler") == 1
 
 
-def test_an_interrupt_tells_that_the_same_command_goes_on(monkeypatch, tmp_path, capsys):
+def test_an_interrupt_reports_that_the_same_command_goes_on(monkeypatch, tmp_path, capsys):
     def stopped(*_):
         raise KeyboardInterrupt
 
@@ -701,7 +701,7 @@ def test_an_interrupt_tells_that_the_same_command_goes_on(monkeypatch, tmp_path,
     assert "interrupted; what was measured is kept, the same command goes on" in capsys.readouterr().err
 
 
-def test_the_budget_that_was_asked_for_is_told(tmp_path, capsys, drawn, monkeypatch):
+def test_the_budget_that_was_asked_for_is_reported(tmp_path, capsys, drawn, monkeypatch):
     original = benchmark.find_reference
     monkeypatch.setattr(benchmark, "find_reference", lambda *given: time.sleep(0.3) or original(*given))
     small = ["--end", "1", "--formulations", "embedding", "--methods", "dop853", "--rtol", "1e-4", "--budget", "0.25", "--output"]
@@ -719,7 +719,7 @@ def test_evaluations_of_series_have_no_operations():
     assert line.split()[6] == "-" and "with taylor orders of its series; operations" in result.table().replace("\n", " ")
 
 
-def test_more_methods_than_colours_are_told_apart():
+def test_more_methods_than_colours_are_distinguished():
     names = [f"m{k}" for k in range(13)]
     styles = styles_of([Row("embedding", name, 1e-6) for name in names])
     looks = {(s["color"], s.get("markerfacecolor", "")) for s in styles.values()}
@@ -732,7 +732,7 @@ def test_more_methods_than_colours_are_told_apart():
     assert (handles["m0"].get_marker(), handles["m8"].get_marker()) == ("None", "o")
 
 
-def test_where_no_run_gets_below_any_error_that_is_told(tmp_path, drawn):
+def test_where_no_run_gets_below_any_error_that_is_reported(tmp_path, drawn):
     rows = [Row("embedding", "dop853", 1e-3, error=0.5, least=1.0, seconds=1.0, errors=(0.5,), until=((1.0, 3),))]
     text = Benchmark("a", 1.0, rows, [], Reference("x", (1.0,), [[0.0]], 3.0, "")).table()
     assert "least time below an error, at the end: none, no run got below 0.01" in text

@@ -45,7 +45,7 @@ def test_a_narrower_command_keeps_what_a_later_one_goes_on_with(bench, tmp_path,
     assert made == [("embedding", 1e-5)] and [r.tolerance for r in narrow.rows] == [1e-5]
     assert stored(tmp_path) == {"": {("embedding", 1e-5)}, wide.fingerprint: {("embedding", t) for t in WIDE}}
     assert narrow.table().count("dop853      1e-") == 1  # it shows what was asked for
-    # Too long to time them anew: they stay, marked.
+    # Too long to time them again: they stay, marked.
     data = json.loads((tmp_path / "results.json").read_text())
     for row in data["carried"][wide.fingerprint]:
         row["took"] = 1e9
@@ -69,7 +69,7 @@ def test_rows_by_another_measure_and_other_times_are_carried_over(bench, tmp_pat
     timed, made = bench(NARROW, at=[0.3])
     assert len(made) == 1 and len(stored(tmp_path)) == 3
     again, made = bench((*NARROW, 1e-8))
-    assert {r.tolerance for r in again.rows} == {1e-5, 1e-8} and len(made) == 2  # that of 1e-5 is cheap, and timed anew
+    assert {r.tolerance for r in again.rows} == {1e-5, 1e-8} and len(made) == 2  # that of 1e-5 is cheap, and timed again
     assert stored(tmp_path) == {"": {("embedding", 1e-5), ("embedding", 1e-8)}, timed.fingerprint: {("embedding", 1e-5)},
                                 bodies.fingerprint: {("embedding", 1e-5), ("absolute", 1e-5)}}
 

@@ -13,7 +13,7 @@ from symdyn.cli.messages import Stop
 from symdyn.errors import ArgumentError
 
 
-def test_options_in_names_and_beside_them_are_checked(tmp_path):
+def test_options_in_names_and_apart_from_them_are_checked(tmp_path):
     for name, told in (("n_link_pendulum(a)", "option n of n_link_pendulum must be of the kind int, such as 5; found 'a'"),
                        ("spatial_chain(x)", "option n of spatial_chain must be of the kind int"),
                        ("n_four_bar(x)", "option n of n_four_bar must be"), ("pendulum(3)", "pendulum takes no option")):
@@ -44,12 +44,12 @@ def test_lists_that_are_empty_are_faults_and_one_name_is_a_list():
     assert (one.formulations, one.methods, one.tolerances, one.steps) == (("embedding",), ("dop853",), (1e-6,), None)
 
 
-def test_a_files_name_is_told_what_to_pass():
+def test_a_files_name_is_answered_with_what_to_pass():
     with pytest.raises(ArgumentError, match=r"mine\.py is the name of a file; pass the System that its function system\(\) ret"):
         sd.bench("mine.py")
 
 
-def test_a_users_file_is_run_once_and_its_faults_are_told(tmp_path, capsys, monkeypatch):
+def test_a_users_file_is_run_once_and_its_faults_are_reported(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(
         "import symdyn as sd\n\nprint('it runs')\n\n\ndef system(orientation='angles'):\n    if orientation == 'parameters':\n"

@@ -194,7 +194,7 @@ def user_function(tmp_path, body, line):
     return system
 
 
-def test_what_a_compiler_says_is_told_once(tmp_path):
+def test_what_a_compiler_says_is_reported_once(tmp_path):
     told = []
     about = of_system(user_function(tmp_path, "-q", "nonsense"), 1.0)
     with pytest.raises(CompileError, match="nonsense") as caught:

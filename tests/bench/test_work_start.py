@@ -66,7 +66,7 @@ def test_other_orientations_than_the_first_would_begin_elsewhere():
         run(about, checked([about], ["augmented:parameters"], ["dop853"], [1e-6], repeats=1))
 
 
-def test_a_motion_that_stands_still_is_told_and_has_no_best(tmp_path):
+def test_a_motion_that_stands_still_is_reported_and_has_no_best(tmp_path):
     system = sd.systems.get("pendulum")
     system.initial = {}
     result = sd.bench(system, formulations=["embedding"], folder=tmp_path, **SMALL)

@@ -65,7 +65,7 @@ def test_a_convention_that_does_not_make_it_equal_excuses_nothing():
      energy_balance("Energy is kept.", [q], m * l**2 * q.dot**2 / 2 - m * g * l * sp.cos(q))),
     ([[m * l]], [[m * l**2]], other("The embedding formulation.", lambda: pendulum().M_tilde)),
 ])
-def test_each_proof_tells_the_wrong_formula_from_the_right_one(printed, derived, proof):
+def test_each_proof_distinguishes_the_wrong_formula_from_the_right_one(printed, derived, proof):
     erratum = sd.Erratum("It is wrong.", proof)
     found = compare(sd.Formula("f", printed, derived, errata=[erratum]))
     assert found.decided and found.counts[Verdict.WRONG] >= 1
@@ -112,7 +112,7 @@ def test_unreadable_formulas_and_entries_keep_what_is_derived():
     assert found.formulas[0].derived == VELOCITY
 
 
-def test_text_of_a_comparison_tells_places_counts_and_points():
+def test_text_of_a_comparison_reports_places_counts_and_points():
     text = str(compare(sd.Formula("v", [VELOCITY[0], -VELOCITY[1]], VELOCITY, line=17)))
     assert "17" in text and "1 equal, proved; 1 different, not proven wrong" in text
     assert re.search(r"\[1\] different, not proven wrong; refuted at this state: printed -?[\d.]+, derived -?[\d.]+ at l =", text)
@@ -136,12 +136,12 @@ def test_text_of_a_comparison_tells_places_counts_and_points():
     (lambda: [sd.Formula("M", [m, l], [g, l], errata=[sd.Erratum("No.", other("it", sp.Matrix([g, l])), [(1,)])])],
      "entry (1,) is wrong, but it equals"),
 ])
-def test_a_bad_case_is_told_what_is_wrong(make, message):
+def test_faults_of_a_bad_case_are_reported(make, message):
     with pytest.raises(sd.CaseError, match=re.escape(message)):
         sd.compare(sd.Case("bad", formulas=make))
 
 
-def test_all_faults_of_a_case_are_told_at_once():
+def test_all_faults_of_a_case_are_reported_at_once():
     with pytest.raises(sd.CaseError) as caught:
         compare(sd.Formula("A", [[m, l], [m]], [[m], [l]]), sd.Formula("B", "m", m))
     assert len(caught.value.faults) == 2 and "'mine' has 2 faults" in str(caught.value)
@@ -246,7 +246,7 @@ def test_entries_of_an_erratum_may_be_lists():
     ({"decimals": -1}, "`decimals` of f is -1 of type int"),
     ({"decimals": True}, "`decimals` of f is True of type bool"),
 ])
-def test_a_formula_is_told_what_has_the_wrong_type(given, message):
+def test_wrong_types_of_a_formula_are_reported(given, message):
     with pytest.raises(sd.CaseError, match=re.escape("the case 'mine': ") + ".*" + re.escape(message)):
         compare(sd.Formula(**{"name": "f", "printed": m, "derived": m} | given))
 
@@ -271,7 +271,7 @@ def test_a_formula_is_told_what_has_the_wrong_type(given, message):
     ({"printed": {"latex": m}, "derived": pendulum()}, "latex of `derived` is a method; call it and pass what it returns: "
      "derived={'latex': ...}"),
 ])
-def test_a_case_is_told_what_has_the_wrong_type(given, message):
+def test_wrong_types_of_a_case_are_reported(given, message):
     name = given.get("name", "mine")
     with pytest.raises(sd.CaseError, match=re.escape(f"the case {name!r}: " if name else "") + ".*" + re.escape(message)):
         sd.compare(sd.Case(**{"name": "mine", "formulas": () if "printed" in given else [sd.Formula("f", m, m)]} | given))
@@ -287,7 +287,7 @@ def test_an_attribute_of_what_is_derived_that_raises():
         sd.compare(sd.Case("mine", printed={"M": m}, derived=Equations()))
 
 
-def test_all_wrong_types_of_a_case_are_told_at_once():
+def test_all_wrong_types_of_a_case_are_reported_at_once():
     case = sd.Case("mine", 3, formulas=[
         sd.Formula("a", m, m, also="3", decimals="2", conventions=sd.conventions.transposed("")),
         sd.Formula("b", m, m, renamed=[m], errata=[sd.Erratum("", None, [0])]), ("c", m, m)], printed=[m])

@@ -145,7 +145,7 @@ def test_the_table_alone(capsys, monkeypatch, tmp_path):
     assert "6 of 6 decided entries are proved equal" in capsys.readouterr().out
 
 
-def test_help_tells_the_exit_codes(capsys):
+def test_help_lists_the_exit_codes(capsys):
     with pytest.raises(SystemExit):
         main(["compare", "--help"])
     said = " ".join(capsys.readouterr().out.split())

@@ -1,4 +1,4 @@
-"""Proofs: what they see and what they do not, and what is refused."""
+"""Proofs: what they see and what they do not, and what is rejected."""
 
 import pytest
 import sympy as sp

@@ -233,7 +233,7 @@ def test_swings_of_a_pendulum_against_elliptic_integrals(amplitude: float) -> No
 
 
 @pytest.mark.parametrize(("mu", "stable"), [(1e-4, True), (-1e-4, False), (0.0, False)])
-def test_verdicts_beside_a_double_multiplier(mu: float, stable: bool) -> None:
+def test_verdicts_next_to_a_double_multiplier(mu: float, stable: bool) -> None:
     """Van der Pol's cycle of amplitude 2 has the multiplier exp(-2 pi mu) for small mu. Without damping both are 1, and the error
     of a double eigenvalue is the square root of that of the motion."""
     found = oscillator().periodic(6.0, [2.0], [0.0], {"mu": mu})

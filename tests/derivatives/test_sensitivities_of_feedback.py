@@ -75,7 +75,7 @@ def test_like_the_law_in_the_loads(method: str) -> None:
     np.testing.assert_allclose(found.sensitivity.at(times[9]), found.sensitivity.matrix[9], rtol=0, atol=1e-12 * scale)
 
 
-def test_one_function_for_all_inputs_and_one_beside_a_controller() -> None:
+def test_one_function_for_all_inputs_and_one_next_to_a_controller() -> None:
     times, of = np.linspace(0, 1, 9), laws()
     both = sd.Smooth(lambda t, x: [of["F"](t, x), of["T"](t, x)],
                      gradient=lambda t, x: [of["F"].gradient(t, x), of["T"].gradient(t, x)])
@@ -123,7 +123,7 @@ def test_gradients_backwards(method: str) -> None:
         np.testing.assert_allclose(found.array, expected.array, rtol=0, atol=1e-7 * np.abs(expected.array).max())
 
 
-def test_gradient_backwards_beside_a_controller() -> None:
+def test_gradient_backwards_next_to_a_controller() -> None:
     given = {"F": laws()["F"], "T": sd.Sampled(lambda t, x: -x[order()[3]], 0.25, gradient=lambda t, x: -np.eye(5)[order()[3]])}
     names = ["m", "q(0)"]
     run = cart(False).simulate((0, 1), inputs=given, rtol=1e-11, sensitivities=names)

@@ -1,4 +1,4 @@
-"""Ensembles: samples, outcomes beside single simulations, members that fail, executors that die, a full disk."""
+"""Ensembles: samples, outcomes compared with single simulations, members that fail, executors that die, a full disk."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def sometimes(solution):
     return solution.x[-1, 0] if solution.params[1] > 1.5 else [1.0, 2.0]
 
 
-def test_a_failed_member_is_told_and_the_others_go_on(module):
+def test_a_failed_member_is_reported_and_the_others_go_on(module):
     angles = np.linspace(-1, 1, 20)
     angles[[3, 11]] = np.nan, np.inf
     done = sd.ensemble(module, {"q1": angles}, T, ["end q1", "trace q2"], chunk=4)
@@ -225,7 +225,7 @@ def test_motions_that_stop_early_and_functions_that_raise_are_failures(module):
     ({"q1": [1, 2]}, {"executor": 3}, "an executor must be"),
     ({"q1": [1, 2]}, {"params": {"m9": 1}}, "there is no 'm9'"),
 ])
-def test_what_does_not_fit_is_told_at_once(module, samples, options, message):
+def test_what_does_not_fit_is_reported_at_once(module, samples, options, message):
     with pytest.raises(ArgumentError, match=message):
         sd.ensemble(module, samples, **{"t": T, **options})
 
@@ -235,7 +235,7 @@ def test_an_unknown_option_is_an_error(module):
         sd.ensemble(module, {"q1": [1, 2]}, T, rtoll=1)
 
 
-def test_what_is_no_mechanism_is_refused():
+def test_what_is_no_mechanism_is_rejected():
     with pytest.raises(ArgumentError, match="needs a Module or a System, found 3"):
         sd.ensemble(3, {"q1": [1, 2]})
 
@@ -347,7 +347,7 @@ def test_a_bounded_number_of_chunks_is_handed_over(module):
 # -- the folder
 
 
-def test_a_full_disk_is_told_and_what_is_there_is_kept(module, tmp_path, monkeypatch):
+def test_a_full_disk_is_reported_and_what_is_there_is_kept(module, tmp_path, monkeypatch):
     whole = sd.ensemble(module, drawn(), T, chunk=10, path=tmp_path / "whole")
     write, written = store.write_archive, []
 

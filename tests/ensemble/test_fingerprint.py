@@ -1,4 +1,4 @@
-"""What tells one outcome function from another when an ensemble goes on."""
+"""Outcome functions are distinguished from each other when an ensemble goes on."""
 
 import functools
 

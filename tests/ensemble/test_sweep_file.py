@@ -145,7 +145,7 @@ def test_compiled_code_runs_in_threads_and_python_in_processes(backend, jobs, ex
         assert isinstance(made, expected) and made._max_workers == jobs
 
 
-def test_every_fault_is_told_with_its_key(tmp_path, capsys):
+def test_every_fault_is_reported_with_its_key(tmp_path, capsys):
     text = """
 system = "double_pendulum"
 tt = 3

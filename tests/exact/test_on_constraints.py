@@ -45,7 +45,7 @@ def test_refuted_at_a_state_that_fulfils_the_relations(a, on):
     assert all(abs(e.subs(proof.state)) < 1e-12 for e in (on if isinstance(on, list) else [on]))
 
 
-def test_proved_without_the_relations_says_so():
+def test_proved_without_the_relations_reports_it():
     assert str(sd.prove(s(x) ** 2 + c(x) ** 2, 1, on=x - y)) == "proved"
 
 
@@ -135,13 +135,13 @@ def test_limits_keep_what_was_found():
     (3, "on takes expressions that are zero somewhere; 3 is not"),
     ([x, sp.Integer(1)], "on takes expressions that are zero somewhere; 1 is not"),
 ])
-def test_what_is_no_relation_is_refused(on, message):
+def test_what_is_no_relation_is_rejected(on, message):
     with pytest.raises(ArgumentError) as error:
         sd.prove(x, y, on=on)
     assert message in str(error.value)
 
 
-def test_equations_without_constraints_are_refused():
+def test_equations_without_constraints_are_rejected():
     with pytest.raises(ArgumentError, match=r"two_link_arm \(embedding\) has no constraints that a claim could hold on"):
         sd.prove(x, y, on=sd.systems.two_link_arm().embedding())
 
@@ -190,7 +190,7 @@ def test_slider_crank_on_its_constraint():
     assert eq.explicit("k_tilde", on_constraints=True) == sp.Matrix([0, l**2 * m * theta.dot**2 * s(phi) / 2])
 
 
-def test_what_cannot_be_written_on_constraints_is_refused(four_bar):
+def test_what_cannot_be_written_on_constraints_is_rejected(four_bar):
     eq = four_bar[0]
     with pytest.raises(ArgumentError, match="has no constraints that a quantity could be written on; leave out on_constraints"):
         sd.systems.two_link_arm().embedding().explicit("k_tilde", on_constraints=True)

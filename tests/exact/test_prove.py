@@ -103,7 +103,7 @@ def test_dynamicsymbols_stand_for_coordinates():
     assert alone.refuted and set(alone.state) == set(q)
 
 
-def test_symbols_of_one_name_are_told_apart():
+def test_symbols_of_one_name_are_distinguished():
     proof = sd.prove(sp.Matrix([0, m * x]), sp.Matrix([0, sp.Symbol("m") * x]))
     assert str(proof) == ("refuted: entry [1]: the sides differ by x*(m - m'); m is not the same symbol on both sides: "
                           "a parameter with positive=True in a, a parameter without assumptions in b")

@@ -293,12 +293,12 @@ GOOD = {"stations": STATIONS, "mass_per_length": MASS, "stiffness": EI, "shapes"
     ({"shapes": [sd.Shape("x", [1, 2]), sd.Shape("y", [1]), sd.Shape("x", [2, 4])]}, "the shapes 1, 3 depend on each other"),
     ({"shapes": [sd.Shape("x", [1]), sd.Shape("x", [0])]}, "shape 2 is zero"),
 ])
-def test_bad_input_is_told_in_numbers(change, message) -> None:
+def test_bad_input_is_reported_in_numbers(change, message) -> None:
     with pytest.raises(sd.ModelError, match=message):
         sd.Beam(**(GOOD | change))
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_all_faults_are_reported_at_once() -> None:
     with pytest.raises(sd.ModelError) as raised:
         sd.Beam([0, 1, 2], [1, 2], [1, -1, 1], [sd.Shape("z", [1]), sd.Shape("x", [1], powers=[1])], name="mast")
     assert len(raised.value.faults) == 4 and all("beam 'mast'" in fault for fault in raised.value.faults)

@@ -258,7 +258,7 @@ def test_floating_turbine_rests_with_its_tower_bent() -> None:
 
 
 def test_absolute_coordinates_of_a_lamp_on_a_ship() -> None:
-    """A body that is light beside another has mass, and nothing is refused."""
+    """A body that is light compared with another has mass, and nothing is rejected."""
     system = sd.System("ship", gravity=[0, 0, -GRAVITY])
     ship = system.add_body("ship", mass=1e7, inertia=[1e9, 1e9, 1e9])
     system.add_joint(sd.Free("sea", system.ground, ship))

@@ -1,4 +1,4 @@
-"""The NREL 5-MW turbine's tower and blade: published integrals, and frequencies beside an independent finite element model."""
+"""The NREL 5-MW turbine's tower and blade: published integrals, and frequencies by an independent finite element model."""
 
 from __future__ import annotations
 

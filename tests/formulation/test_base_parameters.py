@@ -192,7 +192,7 @@ def test_written_files_do_not_depend_on_what_was_asked_before() -> None:
 
 
 def test_regrouping_by_elimination() -> None:
-    """Factors that no single entry tells, with parameters in all of them."""
+    """Factors that no single entry shows, with parameters in all of them."""
     r = Recorder()
     p, q = r.leaf("p", PARAMETER), r.leaf("q", COORDINATE)
     a, b = (r.leaf(f"u{k}_dot", ACCELERATION) for k in "ab")
@@ -215,7 +215,7 @@ def test_independent_columns_are_the_first() -> None:
     assert found.margins[0] > 0.1 and found.margins[1] < 1e-14
 
 
-def test_doubtful_columns_are_refused() -> None:
+def test_doubtful_columns_are_rejected() -> None:
     A = np.eye(4)[:, :3].copy()
     A[:, 2] = A[:, 0] + [0, 0, 0, 3e-8]
     with pytest.raises(SymdynError, match="whether c can be distinguished from the parameters before it is unclear in double"):

@@ -109,7 +109,7 @@ def test_absolute_coordinates_give_the_same() -> None:
     assert np.abs(np.subtract(*rates)).max() < 1e-11 * np.abs(rates[0]).max()
 
 
-def test_report_tells_what_is_not_rigid() -> None:
+def test_report_reports_what_is_not_rigid() -> None:
     equations = ship().recursive()
     assert "no pages of links" in str(equations.compile(backend="numpy").report())
     with pytest.raises(SymdynError, match="has added mass or elastic bodies"):
@@ -188,7 +188,7 @@ def test_elastic_coordinates_must_be_symbols() -> None:
         system.check()
 
 
-def test_far_deflection_is_told() -> None:
+def test_far_deflection_is_reported() -> None:
     system = sd.System("rod", gravity=[0, 0, 0])
     rod = system.add_flexible_body("rod", BEAM)
     system.add_joint(sd.Fixed("clamp", system.ground, rod.root))

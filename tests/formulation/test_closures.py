@@ -231,7 +231,7 @@ def test_gear() -> None:
 
 @pytest.mark.parametrize("turns", [0, 3, -7])
 def test_a_screw_keeps_its_turns(turns: int) -> None:
-    """A thread beside a cylindrical joint, after several turns: the angle alone does not tell how far it went."""
+    """A thread next to a cylindrical joint, after several turns: the angle alone does not show how far it went."""
     q, z = sd.coordinates("q z")
     s = sd.System("thread")
     nut = s.add_body("nut", mass=1, inertia=[1, 1, 1])

@@ -92,7 +92,7 @@ def test_unsupported_expressions_tell_where(expression, message):
         system.embedding().tape("rhs")
 
 
-def test_unsupported_output_tells_where():
+def test_unsupported_output_reports_where():
     system = double(q2)
     system.add_output("odd", sp.gamma(q1))
     with pytest.raises(sd.UnsupportedExpression, match="output odd: gamma"):

@@ -308,13 +308,13 @@ def test_coordinate_without_mass_follows_its_constraint():
     assert np.abs(lam[:, 1]).max() <= 1e-9  # nothing pulls at z
 
 
-def test_prescribed_motion_is_allowed_and_told():
+def test_prescribed_motion_is_allowed_and_reported():
     eq = sd.augmented([x, y], [m, m], [0, -m * g], [x - sp.sin(t), y - x**2])
     assert any(note.startswith("motion: ") for note in eq.notes)
     assert sp.simplify(eq.explicit("accelerations")[0] + sp.sin(t)) == 0
 
 
-def test_dependent_constraints_are_told_and_left_out():
+def test_dependent_constraints_are_reported_and_left_out():
     eq = sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 - l**2, 3 * x**2 + 3 * y**2 - 3 * l**2], names=["one", "again"],
                       initial={x: 0.6, y: -0.8}, defaults={m: 2, g: 9.81, l: 1})
     assert any("they depend on the others" in note for note in eq.notes)

@@ -13,7 +13,7 @@ from symdyn.tape.recorder import Recorder
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 def test_no_indefinite_mass_matrix_passes(backend: str) -> None:
-    """Accelerations are computed where masses make the matrix positive definite, and refused everywhere else."""
+    """Accelerations are computed where masses make the matrix positive definite, and rejected everywhere else."""
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")
     module = systems.get("n_link_pendulum", n=5).embedding().compile(backend=backend)

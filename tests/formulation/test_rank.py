@@ -1,4 +1,4 @@
-"""Mechanisms whose mass matrix is singular at every state are refused with the speed and what to do."""
+"""Mechanisms whose mass matrix is singular at every state are rejected with the speed and what to do."""
 
 import pytest
 

@@ -94,7 +94,7 @@ def test_unknown_frames() -> None:
         sd.systems.get("pendulum").recursive(frames="world")
 
 
-def test_constraints_are_refused() -> None:
+def test_constraints_are_rejected() -> None:
     s = sd.systems.get("double_pendulum")
     s.add_constraint(sp.sin(sd.coordinates("q1")))
     with pytest.raises(ModelError, match="the recursive form takes trees only"):
@@ -113,7 +113,7 @@ def test_links_by_body_name_and_number() -> None:
         _ = equations.link(1).I_B
 
 
-def test_what_a_mechanism_does_not_have_is_told_with_the_reason() -> None:
+def test_what_a_mechanism_does_not_have_is_reported_with_the_reason() -> None:
     s = sd.systems.get("double_pendulum")
     s.move_ground([sp.sin(sd.t), 0])
     with pytest.raises(SymdynError, match=r"no quantity 'coriolis'.*joints .* follow given functions of time"):
@@ -133,7 +133,7 @@ def test_lecture_quantities_of_the_double_pendulum() -> None:
     ({"m1": float("nan")}, "must be finite, found m1 = nan"), ({"m1": "a"}, "the value of m1 is 'a', not a number"),
     ({"m1": None}, "the value of m1 is None, not a number"), ([1, 2], "must be a mapping from symbols or names to numbers"),
     ({"mass": 1}, "there is no 'mass'")])
-def test_what_cannot_be_bound_is_told(wrong: Any, message: str) -> None:
+def test_what_cannot_be_bound_is_reported(wrong: Any, message: str) -> None:
     with pytest.raises(SymdynError, match=rf"double_pendulum: specialize.*{message}"):
         sd.systems.get("double_pendulum").recursive().compile(backend="numpy", specialize=wrong)
     if isinstance(wrong, list) or "m1" in wrong:

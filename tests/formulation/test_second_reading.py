@@ -92,7 +92,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
-def test_lumping_and_parallel_frames_change_nothing() -> None:
+def test_regrouping_and_parallel_frames_change_nothing() -> None:
     system, seen = machine(), []
     for aligned, grouped, kind in ((False, False, TreeQuantities), (False, True, TreeQuantities), (True, True, TreeQuantities),
                                    (True, True, RecursiveTree)):
@@ -150,12 +150,12 @@ def test_a_zero_eigenvalue_is_not_called_double() -> None:
         linear.derivative("z", "k")
 
 
-def test_what_extra_states_lack_is_told() -> None:
+def test_what_extra_states_lack_is_reported() -> None:
     with pytest.raises(NoEquilibrium, match=r"extra states change: z by 1 a second; the last state is x = 0.2, z = 0"):
         slider(lambda x, z, k: 1 - k * x, lambda x, z, k: 1 + 0 * z).equilibrium()
 
 
-def test_what_is_loose_under_constraints_is_told_when_parameters_are_solved_for() -> None:
+def test_what_is_loose_under_constraints_is_reported_when_parameters_are_solved_for() -> None:
     """Along x = -y the force of the springs, k (-x, y), is one that the constraint bears."""
     (x, y, z), (k, f) = sd.coordinates("x y z"), sd.parameters("k f")
     system = sd.System("saddle", gravity=[0, 0, 0])
@@ -183,7 +183,7 @@ def turned(orientation: Any, rate: str) -> None:
     system.embedding().compile(backend="numpy").simulate((0, 1.5), u={rate: 2.0})
 
 
-def test_half_a_turn_of_a_rotation_vector_is_told() -> None:
+def test_half_a_turn_of_a_rotation_vector_is_reported() -> None:
     with pytest.warns(SimulationWarning, match=r"mooring: the body has turned by 17\d.* degrees; at half a turn its angles jump"):
         turned(sd.EulerParameters(), "omega_z_sea")
 

@@ -49,7 +49,7 @@ def test_blocks_are_solved_one_after_the_other() -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 4])
-def test_where_they_are_singular_the_reason_is_told(n: int) -> None:
+def test_where_they_are_singular_the_reason_is_reported(n: int) -> None:
     q, u = list(dynamicsymbols(f"q1:{n + 1}")), list(dynamicsymbols(f"u1:{n + 1}"))
     K = sp.Matrix(n, n, lambda i, j: sp.sin(q[0]) * (1 + i + j) + (sp.sin(q[0]) if i == j else 0))
     equations = sd.from_sympy((q, u, sp.eye(n), [0] * n), "singular",

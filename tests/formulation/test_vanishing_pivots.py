@@ -1,4 +1,4 @@
-"""Positions at which the mass matrix loses rank although masses are positive: what is found, what it costs, what is refused."""
+"""Positions at which the mass matrix loses rank although masses are positive: those found, their cost, those rejected."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_of_dependent_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 2 <= added(get("double_wishbone"), "augmented", monkeypatch) <= 6
 
 
-# -- what is refused
+# -- states that are rejected
 
 
 def module_of(equations: Any, backend: str) -> Any:
@@ -254,8 +254,8 @@ CASES: dict[str, tuple[Callable[[], sd.System], int, tuple[float, ...], str]] = 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("case", CASES)
-def test_states_that_have_no_accelerations_are_refused(case: str, form: str, backend: str) -> None:
-    """Every one is refused with its reason; at 1e-5 rad from it every one is computed, with the digits that it has left."""
+def test_states_that_have_no_accelerations_are_rejected(case: str, form: str, backend: str) -> None:
+    """Every one is rejected with its reason; at 1e-5 rad from it every one is computed, with the digits that it has left."""
     make, place, values, said = CASES[case]
     system = make()
     equations, reference = getattr(system, form)(), system.embedding()
@@ -275,7 +275,7 @@ def test_states_that_have_no_accelerations_are_refused(case: str, form: str, bac
 @pytest.mark.filterwarnings("ignore:top. in 1 of 7 motions")
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("form", FORMS)
-def test_only_the_state_concerned_is_refused(form: str, backend: str) -> None:
+def test_only_the_state_concerned_is_rejected(form: str, backend: str) -> None:
     module = module_of(getattr(top(), form)(), backend)
     x = states(3, 3, 1, (0.3,), 7)
     usual = module.rhs(np.zeros(7), x)
@@ -358,7 +358,7 @@ def test_a_constraint_may_hold_the_angle(backend: str) -> None:
 
 @pytest.mark.parametrize("make", [top, gimbal], ids=["top", "gimbal"])
 def test_in_floats_and_with_many_digits(make: Callable[[], sd.System]) -> None:
-    """In floats the lock is refused; 50 digits tell the float that is nearest to a right angle from it."""
+    """In floats the lock is rejected; 50 digits distinguish the float that is nearest to a right angle from it."""
     numeric, equations = NumericTree(make().check()), make().embedding()
     rng = np.random.default_rng(5)
     for _ in range(20):

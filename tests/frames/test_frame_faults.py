@@ -1,4 +1,4 @@
-"""What frames, points and numbers refuse, and what the messages tell."""
+"""Arguments that frames, points and numbers reject, with their messages."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SKEWED = sp.Matrix([[sp.cos(q), sp.sin(q), 0], [sp.sin(q), sp.cos(q), 0], [0, 0,
     (lambda: n.vector([1, 0, 0]).components(sd.Frame("m")), sd.ArgumentError, "frames of different trees"),
     (lambda: n.point("P", [q.dot, 0, 0]).acceleration(), sd.ModelError, "the rate of q_ddot is asked for"),
 ])
-def test_refused(call, error, message):
+def test_rejected(call, error, message):
     with pytest.raises(error, match=message):
         call()
 

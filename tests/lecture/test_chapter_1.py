@@ -1,4 +1,4 @@
-"""Chapter 1: the errors that were found, what the slides give once they are mended, and motions by independent routes."""
+"""Chapter 1: the errors that were found, what the slides give once they are corrected, and motions by independent routes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_errors_that_were_found() -> None:
 
 
 def mended() -> dict:
-    """The printed formulas with the one wrong thing put right, typed anew."""
+    """The printed formulas with the one wrong thing put right, typed again."""
     f = chapter_1_rotating_frame.turning()
     R, w, alpha, crossed = f.R, f.omega, f.alpha, chapter_1_rotating_frame.crossed
     m, g, a, r, omega, v = sp.symbols("m_P g a r_AB omega v", positive=True)
@@ -55,12 +55,12 @@ def mended() -> dict:
 
 
 @pytest.mark.parametrize("place", mended(), ids=lambda place: ": ".join(place))
-def test_mended_slides_are_equal(place: tuple[str, str]) -> None:
+def test_corrected_slides_are_equal(place: tuple[str, str]) -> None:
     changed = replace(formula(*place), printed=mended()[place], errata=())
     assert set(verdicts(changed)) == {Verdict.EQUAL}
 
 
-def test_size_of_the_acceleration_mended() -> None:
+def test_size_of_the_acceleration_corrected() -> None:
     s = sd.coordinates("s")
     R, beta = sp.symbols("R beta", positive=True)
     changed = replace(formula("tangential-normal", "size of the acceleration"), errata=(),

@@ -1,4 +1,4 @@
-"""Chapter 2: the errors that were found, what the slides give once they are mended, and the letters they are typed in."""
+"""Chapter 2: the errors that were found, what the slides give once they are corrected, and the letters they are typed in."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def test_errors_that_were_found() -> None:
     assert found == {2523, 2598}
 
 
-def test_mended_moment_of_one_particle() -> None:
+def test_corrected_moment_of_one_particle() -> None:
     m1, r1, rO, omega = (getattr(chapter_2_moment, name) for name in ("m1", "r1", "rO", "omega"))
     right = m1 * r1.cross(ddot(rO)) + sd.rate(chapter_2_moment.inertia_of(m1, r1) * omega)
     assert set(verdicts(replace(formula("particle-moment", "with I_O"), printed=right, errata=()))) == {Verdict.EQUAL}
 
 
-def test_mended_rate_of_the_rotation() -> None:
+def test_corrected_rate_of_the_rotation() -> None:
     wrong = formula("rate-of-angular-momentum", "rate of bRn, on any vector")
     assert set(verdicts(replace(wrong, printed=-wrong.printed, errata=()))) == {Verdict.EQUAL}
 

@@ -1,4 +1,4 @@
-"""Chapter 6: the errors that were found, what the slides give once they are mended, and numbers by other formulations."""
+"""Chapter 6: the errors that were found, what the slides give once they are corrected, and numbers by other formulations."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_errors_that_were_found(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["r_G", "velocity of G", "velocity of G, exchanged", "J"])
-def test_mended_arm_of_the_platform(name: str) -> None:
+def test_corrected_arm_of_the_platform(name: str) -> None:
     """With the arm r_G/O in place of r_O/G."""
     wrong = formula("platform-transformation", name)
     arm = {letter: -value for letter, value in wrong.renamed.items()}
@@ -39,7 +39,7 @@ def test_mended_arm_of_the_platform(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["r_O", "velocity of O", "velocity of O, exchanged", "velocities in matrix form"])
-def test_mended_names_of_G_and_O(name: str) -> None:
+def test_corrected_names_of_G_and_O(name: str) -> None:
     """With G and O interchanged again: r_G = r_O + R r_G/O."""
     wrong = formula("platform-transformation-augmented", name)
     p = Platform()
@@ -49,7 +49,7 @@ def test_mended_names_of_G_and_O(name: str) -> None:
     assert set(verdicts(replace(wrong, derived=right.get(name, point.velocity()), errata=()))) == {Verdict.EQUAL}
 
 
-def test_mended_k_bar() -> None:
+def test_corrected_k_bar() -> None:
     wrong = formula("platform-embedding", "k_bar of chapter 6.3, upright")
     right = sp.Matrix(formula("platform-embedding", "k_bar").printed).xreplace(dict.fromkeys(q[3:], sp.S.Zero))
     assert set(verdicts(replace(wrong, printed=right, errata=()))) == {Verdict.EQUAL}
@@ -68,7 +68,7 @@ def test_k_bar_keeps_the_energy() -> None:
     assert abs(rates @ M_dot @ rates / 2 - rates @ printed.ravel()) > 1e-2
 
 
-def test_mended_turbine() -> None:
+def test_corrected_turbine() -> None:
     wrong = formula("turbine-newton-euler", "all bodies")
     bodies = [chapter_6_platform.Body(name, principal=True) for name in chapter_6_platform.BODIES]
     left = sp.Matrix.vstack(*[b.M * b.s_ddot + b.Q * b.s_dot for b in bodies])

@@ -211,7 +211,7 @@ def test_keel_or_deck_in_the_water_plane(z: float, part: float, stiffness: int) 
     np.testing.assert_allclose(found["f"], [[0, 0, WEIGHT * part * 15000]], rtol=1e-14)
 
 
-def test_the_watches() -> None:
+def test_validity_checks() -> None:
     site = Site.of()
     low, high = sd.Buoyancy("hull", **BARGE, density=RHO, name="hull's").act(site).validity_checks
     assert low.label == "immersed part of hull's" and 0 < low.least < 1e-6 and low.most == np.inf

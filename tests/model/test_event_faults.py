@@ -1,4 +1,4 @@
-"""What is wrong with events is told with all other faults."""
+"""Faults of events are reported with all others."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def test_expanding_a_tape_gives_the_applied_function_back() -> None:
     assert expand(Output.of("f", np.array(entries, dtype=object)), symbols) == sp.Matrix([one * two - S, HEIGHT(K)])
 
 
-def test_no_derivative_is_told() -> None:
+def test_no_derivative_is_reported() -> None:
     message = (r"a derivative of bounded\(v\) is needed and not given; pass derivative= to sd.External, another sd.External of "
                "the same arguments that gives one result")
     recorder, leaves, entries = recorded(BOUNDED(X))
@@ -147,7 +147,7 @@ def test_no_derivative_is_told() -> None:
     assert jacobian(recorder, entries, [leaves[1]]).tolist() == [[0]]
 
 
-def test_no_python_function_is_told() -> None:
+def test_no_python_function_is_reported() -> None:
     f = sd.External("f", ["v"], c=C)
     with pytest.raises(UnsupportedExpression, match=r"f\(v\) must be evaluated in Python, and has no Python function; pass "):
         recorded(f(2))
@@ -234,11 +234,11 @@ def test_faults(changes: dict[str, Any], message: str | None) -> None:
         assert re.search(message, "\n".join(faulty(**changes)))
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_all_faults_are_reported_at_once() -> None:
     assert len(faulty(name="2f", results=0, reason="\n", c="x", python=None)) == 4
 
 
-def test_what_a_function_takes_from_outside_is_told() -> None:
+def test_what_a_function_takes_from_outside_is_reported() -> None:
     captured = 3
 
     def closed(v):
@@ -260,7 +260,7 @@ def test_what_a_function_takes_from_outside_is_told() -> None:
     assert re.search("sound uses helped, which", faulty(python=sound)[0])
 
 
-def test_another_np_is_told() -> None:
+def test_another_np_is_reported() -> None:
     scope = {"np": sp, "__name__": "elsewhere"}
     elsewhere = type(sines)(sines.__code__, scope, "sines")
     assert re.search("sines uses np, which is <module 'sympy'.*> there, and NumPy in generated modules",

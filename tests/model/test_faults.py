@@ -1,4 +1,4 @@
-"""Faulty descriptions: each fault gives one message that tells what was asked, what was found and what to do."""
+"""Faulty descriptions: each fault gives one message with what was requested, what was found and what to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faulty helical and custom joints and quasi-velocities: each gives one message that tells what was asked and what to do."""
+"""Faulty helical and custom joints and quasi-velocities: each gives one message with what was requested and what to do."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def test_the_series_of_the_rotation_vector_meets_the_closed_form() -> None:
         assert max(abs(jump)) < mpmath.mpf(10) ** -25
 
 
-def test_tilt_is_watched() -> None:
+def test_tilt_has_a_range_of_validity() -> None:
     site = LeafSite()
     action = stiffness(name="water plane").act(site)  # type: ignore[arg-type]
     check = action.validity_checks[0]
@@ -259,7 +259,7 @@ def test_faults(name: str) -> None:
         s.check()
 
 
-def test_damping_that_feeds_energy_is_told() -> None:
+def test_damping_that_feeds_energy_is_reported() -> None:
     """Skew parts do no work; a symmetric part [[1, 2], [2, 1]] has the eigenvalue -1."""
     def checked(b: float, sign: int) -> None:
         B = np.eye(6)

@@ -1,4 +1,4 @@
-"""Faulty loops and constraints: each gives one message that tells what was asked, what was found and what to do."""
+"""Faulty loops and constraints: each gives one message with what was requested, what was found and what to do."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def arm(planar: bool = False, **options: Any) -> sd.System:
 
 
 def given_by_time() -> sd.System:
-    """Both angles are given functions of time; a slider beside them moves."""
+    """Both angles are given functions of time; a slider next to them moves."""
     s = arm(planar=True)
     for joint, angle in zip(s.joints, (sp.sin(sd.t), k * sd.t), strict=True):
         joint.coordinates = (angle,)
@@ -303,7 +303,7 @@ def test_no_fault(name: str) -> None:
     assert s.augmented().constraints == rows
 
 
-def test_out_of_reach_is_told_as_a_warning() -> None:
+def test_out_of_reach_gives_a_warning() -> None:
     """Whether numbers let a loop close is found by looking for a state."""
     s = arm(planar=True)
     loop(s, sd.Revolute, parent_point=[5, 0], child_point=[1, 0])

@@ -29,7 +29,7 @@ def line(**given: Any) -> sd.MooringLine:
 
 # -- published values
 
-# What MAP++ 1.20.10 tells of lines 1 and 2 of the barge (MAP.sum of OpenFAST's regression test 5MW_ITIBarge_DLL_WTurb_WavesIrr),
+# Results of MAP++ 1.20.10 for lines 1 and 2 of the barge (MAP.sum of OpenFAST's regression test 5MW_ITIBarge_DLL_WTurb_WavesIrr),
 # with w = 1227.15 N/m, which is g = 9.80665 m/s^2, and C_B = 1: the force that holds the fairlead, N, and H and V.
 HELD = ((-88008.141, -36454.587, 257299.002), (-36491.731, -88105.016, 257371.155))
 PULLED = ((95259.486, 257299.002), (95363.202, 257371.155))
@@ -178,7 +178,7 @@ def test_a_tension_leg_is_pulled_back_by_its_tension_over_its_length(seabed: boo
         np.testing.assert_allclose(found["elastic"], found["gradient"], rtol=1e-6, atol=1e-3)
 
 
-def test_a_strain_that_no_line_bears_is_told() -> None:
+def test_a_strain_that_no_line_bears_is_reported() -> None:
     short = line(length=430.0, name="bow line")
     run = buoy(0, short).recursive().compile(backend="numpy")
     with pytest.warns(sd.SimulationWarning, match="bow line: it is stretched by") as told:
@@ -222,7 +222,7 @@ def test_faults(name: str) -> None:
         buoy(0, line(**given, name="bow line")).check()
 
 
-def test_all_faults_of_a_line_are_told_at_once() -> None:
+def test_all_faults_of_a_line_are_reported_at_once() -> None:
     with pytest.raises(sd.ModelError) as error:
         buoy(0, line(length=-1, weight=-2, stiffness=-3, friction=-4, name="bow line")).check()
     assert len(error.value.faults) == 4

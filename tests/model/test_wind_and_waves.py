@@ -83,7 +83,7 @@ def test_drag_in_still_air_only_takes_energy() -> None:
 
 
 def test_drag_has_derivatives_at_rest() -> None:
-    """They are zero, in floats and with many digits; beside it they are those of |v| v."""
+    """They are zero, in floats and with many digits; elsewhere they are those of |v| v."""
     site = LeafSite()
     action = sd.Drag("float", 2, 1, 1).act(site)  # type: ignore[arg-type]
     first = [forward(site.recorder, action.other[0], {leaf: 1}) for leaf in site.v]

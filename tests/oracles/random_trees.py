@@ -105,7 +105,7 @@ def _orientation(rng: random.Random) -> Any:
 
 
 def _free(rng: random.Random) -> dict[str, Any]:
-    """Orientation and velocity of a free joint; a velocity in body axes beside derivatives of angles is left out, as no other
+    """Orientation and velocity of a free joint; a velocity in body axes with derivatives of angles is left out, as no other
     program has these speeds."""
     orientation = _orientation(rng)
     body = orientation.angular_velocity and rng.random() < 0.5

@@ -1,4 +1,4 @@
-"""The full report: every part is on the page, figures are those of independent routes, what fails is told and loses nothing."""
+"""The full report: every part is on the page, figures are those of independent routes, failures are reported and lose nothing."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def rows(text: str, name: str) -> list[list[str]]:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
-    """The page of a pendulum, with few runs and checks, and what was told on the way."""
+    """The page of a pendulum, with few runs and checks, and what was printed on the way."""
     told: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(full_work, "TOLERANCES", (1e-5, 1e-9))
@@ -228,7 +228,7 @@ def test_names_with_indices_get_no_second_one() -> None:
 # -- what fails
 
 
-def test_a_part_that_fails_is_told_and_loses_nothing(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_part_that_fails_is_reported_and_loses_nothing(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def named(*arguments: Any) -> None:
         raise SymdynError("nothing can be measured <here>")
 
@@ -310,7 +310,7 @@ def test_a_reference_that_is_not_kept_is_not_made_too_often(benches: SimpleNames
     assert full_work.measure("m", "", 10, quiet)[0].unfinished == "10 s were not enough for gauss, radau"
 
 
-def test_nothing_measured_is_told(benches: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_measured_is_reported(benches: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("symdyn.bench.work.bench", lambda *arguments, **options: measured(unfinished="all"))
     with pytest.raises(SymdynError, match=r"no run was made within 10 s.*give more time with --budget"):
         full_work.measure("m", "a", 10, quiet)
@@ -333,7 +333,7 @@ def test_rows_are_merged_once() -> None:
     assert both.operations == {"a": 1, "b": 2} and both.skipped == first.skipped
 
 
-def test_bad_arguments_are_refused_before_anything_is_done(tmp_path: Path) -> None:
+def test_bad_arguments_are_rejected_before_anything_is_done(tmp_path: Path) -> None:
     told: list[str] = []
     (tmp_path / "taken").write_text("")
     for call, message in (

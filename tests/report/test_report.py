@@ -55,7 +55,7 @@ def test_both_ways_to_the_accelerations_are_counted():
     assert "2 constraints" in text and all(row_of(text, name) for name in ("C", "C_r", "F_d", "lam", "reactions"))
 
 
-def test_dependent_and_trivial_rows_are_told():
+def test_dependent_and_trivial_rows_are_reported():
     assert "they depend on the others at every state tried" in augmented_report(sd.systems.get("bricard"))
     q = sd.coordinates("q1:4")
     system, parent, at = sd.System("parallel", gravity=[0, 0, -9.81]), None, [0, 0, 0]

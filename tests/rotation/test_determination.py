@@ -63,7 +63,7 @@ def test_a_cyclic_permutation_of_the_axes_is_xyz_at_lock() -> None:
     assert found.at(first=phi) == sp.Matrix([phi, sp.pi / 2, sp.pi / 2 - phi])
 
 
-def test_lock_ends_where_the_matrix_tells_the_angles_apart() -> None:
+def test_lock_ends_where_the_matrix_distinguishes_the_angles() -> None:
     near = rotation.to_euler(rotation.from_euler("ZYX", [0.3, PI / 2 - 1e-10, 0.2]), "ZYX")
     assert not near.locked and near.distance == pytest.approx(1e-10, rel=1e-5) and near.value is None and near.sign is None
     assert near.angles == pytest.approx([0.3, PI / 2, 0.2], abs=1e-5)

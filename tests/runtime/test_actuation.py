@@ -217,7 +217,7 @@ def test_fewer_inputs_than_freedoms_name_the_direction() -> None:
         pendulum.actuation(0.0, [1.0], [0.0], [0.0])
 
 
-def test_a_direction_of_several_coordinates_is_told_with_its_shares() -> None:
+def test_a_direction_of_several_coordinates_is_reported_with_its_shares() -> None:
     """Two carts on one rod: x1 and x2 move together, and no input moves them."""
     x1, x2 = sd.coordinates("x1 x2")
     s = sd.System("train")

@@ -191,8 +191,8 @@ def test_failed_motions_are_reported_and_the_others_run(double: Any) -> None:
     assert (many.x[many.success] == good.x[many.success]).all() and np.isnan(many.x[[2, 4]]).all()
 
 
-def test_what_happens_on_the_way_is_told() -> None:
-    """As `simulate` tells it: a force that grows beyond all bounds at t = 1/k, and a mass that is none."""
+def test_what_happens_on_the_way_is_reported() -> None:
+    """As `simulate` reports it: a force that grows beyond all bounds at t = 1/k, and a mass that is none."""
     x, k, m = sd.coordinates("x"), *sd.parameters("k m")
     system = sd.System("burst")
     body = system.add_body("b", mass=m)
@@ -316,7 +316,7 @@ def test_interrupt_keeps_what_is_finished(fast: Any) -> None:
     assert np.isnan(solution.x[~solution.success]).all()
 
 
-def test_masses_that_no_body_has_are_told_as_one_motion_tells_them(fast: Any) -> None:
+def test_masses_that_no_body_has_are_reported_as_by_one_motion(fast: Any) -> None:
     masses = [1.0, -0.1, 2.0, -3.0]  # with the first of these the mass matrix is still positive definite
     told = r"1: double_pendulum: the parameter m2, the mass of body '\w+', is -0.1 kg; pass .*; 3: .* is -3 kg"
     with pytest.warns(SimulationWarning, match=f"2 of 4 motions failed: {told}"):
@@ -330,7 +330,7 @@ def test_masses_that_no_body_has_are_told_as_one_motion_tells_them(fast: Any) ->
 
 
 @pytest.mark.parametrize("backend", ["c", "numpy"])
-def test_what_loads_want_to_be_looked_at_is_told_once(backend: str) -> None:
+def test_validity_checks_warn_once(backend: str) -> None:
     """A box that floats, that leaves the water, and that sinks."""
     z, m, pull = sd.coordinates("z"), sd.parameters("m"), sd.inputs("pull")
     system = sd.System("float", gravity=[0, 0, -10])
@@ -387,7 +387,7 @@ def test_events_end_motions() -> None:
     assert sd.ensemble(module, {"z": [1.0, 50.0]}, t=(0, 2), outcomes=["end z"], events=False)["end z"][0] == pytest.approx(-19)
 
 
-def test_the_report_tells_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
+def test_the_report_reports_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
     fast.rhs_batch(0.0, np.zeros((1, 4)))
     assert four_bar.batch_width > 1  # compiles it
     for module, told in ((fast, f"rhs_batch {fast.batch_width} on the processor's vectors, simulate_batch likewise"),

@@ -206,8 +206,8 @@ UNKNOWN = "whether the motion is stiff is not known"
      "to shorter steps"),
     (100, 1e-3, 1.5e-2, 1e-3, "radau",
      "the motion is stiff: after t = 0.1 s implicit steps are 15 times as long as explicit ones, and pay from 10 times on")])
-def test_auto_tells_what_trial_runs_tell(steps: int, length: float, longer: float | None, rtol: float, method: str, why: str,
-                                         oil: dict[str, Any]) -> None:
+def test_auto_reports_what_trial_runs_show(steps: int, length: float, longer: float | None, rtol: float, method: str, why: str,
+                                           oil: dict[str, Any]) -> None:
     """Trial runs that take steps of these lengths."""
     backend = "numpy" if method.isupper() else "c"
     if backend not in oil:
@@ -227,7 +227,7 @@ def test_auto_tells_what_trial_runs_tell(steps: int, length: float, longer: floa
     assert found[0] == method and why in found[1]
 
 
-def test_auto_tells_that_series_do_not_fit() -> None:
+def test_auto_reports_that_series_do_not_fit() -> None:
     """A force that switches has no Taylor series."""
     if find_compiler() is None:
         pytest.skip("no C compiler here")

@@ -246,7 +246,7 @@ def test_what_is_lost_where_a_gradient_vanishes() -> None:
 
 
 @pytest.mark.parametrize("method", ["LSODA", "RK45"])
-def test_baumgarte_tells_when_it_loses_them(method: str) -> None:
+def test_baumgarte_reports_when_it_loses_them(method: str) -> None:
     with pytest.warns(SimulationWarning, match="lift is violated by 0.01.* of the mechanism's length, which Baumgarte's method"):
         solution = module("driven").simulate((0, 2), method=method, rtol=1e-6, stabilization="baumgarte")
     assert not solution.success and 1.0 < solution.t[-1] < 1.1

@@ -1,4 +1,4 @@
-"""The stabilized index-2 form by an implicit method: against the compiled integrator; what it refuses."""
+"""The stabilized index-2 form by an implicit method: against the compiled integrator; what it rejects."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_steps_times_and_nothing_at_all() -> None:
     ("pendulum", {}, "'ggl' is for equations with constraints"), ("pendulum_absolute", {"work": True}, "leave out work=True"),
     ("pendulum_absolute", {"stabilization": "none"}, "keeps the constraints itself; leave out stabilization='none'"),
     ("bricard", {}, "needs independent constraints; of 5 only 4 are")])
-def test_what_it_refuses(name: str, options: dict[str, Any], message: str) -> None:
+def test_what_it_rejects(name: str, options: dict[str, Any], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         module(name).simulate((0, 1), method="ggl", **options)
 

@@ -1,4 +1,4 @@
-"""What a solution under constraints tells: multipliers, violations, rank, which multipliers are unique, reactions, files."""
+"""Facts of a solution under constraints: multipliers, violations, rank, which multipliers are unique, reactions, files."""
 
 from __future__ import annotations
 

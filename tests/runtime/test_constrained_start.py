@@ -123,7 +123,7 @@ def test_nothing_kept() -> None:
 
 
 @pytest.mark.parametrize("method", ["dop853", "LSODA", "ggl"])
-def test_inconsistent_starts_are_refused(method: str) -> None:
+def test_inconsistent_starts_are_rejected(method: str) -> None:
     loop = module("four_bar")
     q, u = loop.consistent(u={"q1_dot": 1.0}, keep=["q1_dot"])
     with pytest.raises(ArgumentError, match=r"initial positions violate hinge4_[xy] by .*module.consistent\(q, u, params\)"):

@@ -363,7 +363,7 @@ def test_large_forces_are_never_left() -> None:
     assert not search.balanced(Search(begin(module, selection, {"a": 0.0, "b": 3e-8}, None, 0.0, None), selection).best)
 
 
-def test_forces_that_depend_on_time_are_told() -> None:
+def test_forces_that_depend_on_time_are_reported() -> None:
     q = sd.coordinates("q")
     A, w = sd.parameters("A w", real=True)
     s = sd.System("shaken")

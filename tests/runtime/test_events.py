@@ -119,7 +119,7 @@ def swinging() -> Any:
 def test_pendulum_by_its_elliptic_period() -> None:
     s, _ = swinging()
     module = s.embedding().compile(backend="c")
-    # The first integral tells the period whatever the pendulum's parameters are.
+    # The period follows from the first integral for any parameters of the pendulum.
     rates = [module.rhs(0.0, [a, 0.0])[1] for a in (0.5, 1.0)]
     omega = np.sqrt(-rates[0] / np.sin(0.5))
     assert -rates[1] / np.sin(1.0) == pytest.approx(omega**2, rel=1e-14)
@@ -163,7 +163,7 @@ UNKNOWN = [("c", "dop853"), ("c", "radau"), ("c", "RK45"), ("numpy", "DOP853")]
 
 @pytest.mark.parametrize(("backend", "method"), UNKNOWN)
 def test_an_event_that_is_not_finite_ends_the_run_where_it_was_known(backend: str, method: str, strange: Any) -> None:
-    """The state that is told is one of the motion, before the angle is 0."""
+    """The state that is reported is one of the motion, before the angle is 0."""
     for steps in (True, False):
         with pytest.warns(SimulationWarning, match=r"pendulum: stopped at t = 0\.5\d*: event strange cannot be evaluated: the "
                                                    r"result is not finite; the state there: q1 = "):

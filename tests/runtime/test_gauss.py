@@ -170,7 +170,7 @@ def test_steps_that_were_divided_are_counted(double: Any) -> None:
             double.simulate((0.0, 10.0), **GAUSS, **given)
 
 
-def test_constraints_are_refused() -> None:
+def test_constraints_are_rejected() -> None:
     with pytest.raises(ArgumentError, match=r"four_bar: method 'gauss' does not fit: .*corrections back onto constraints \(.*"
                                             r"use method='dop853'"):
         constrained("four_bar").simulate((0, 1), **GAUSS)
@@ -215,7 +215,7 @@ def test_functions_are_taken_where_they_are_declared_smooth_alone() -> None:
         sd.Smooth(3)
 
 
-def test_right_hand_sides_that_switch_are_refused() -> None:
+def test_right_hand_sides_that_switch_are_rejected() -> None:
     q = sd.coordinates("q")
     system = sd.System("rubbed")
     slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))
@@ -225,7 +225,7 @@ def test_right_hand_sides_that_switch_are_refused() -> None:
         system.embedding().compile("c").simulate((0, 1), **GAUSS)
 
 
-def test_functions_of_the_user_are_refused_with_their_own_reason() -> None:
+def test_functions_of_the_user_are_rejected_with_their_own_reason() -> None:
     q = sd.coordinates("q")
     system = sd.System("held")
     slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))

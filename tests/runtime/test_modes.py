@@ -121,7 +121,7 @@ def test_gyroscopic_and_damped_against_scipy() -> None:
         assert np.abs(residual).max() < 1e-11 * 200
 
 
-def test_zero_mode_is_told_once() -> None:
+def test_zero_mode_is_reported_once() -> None:
     """Two masses on one spring with nothing to hold them."""
     q1, q2 = sd.coordinates("q1 q2")
     s = sd.System("adrift")

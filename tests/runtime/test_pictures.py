@@ -235,7 +235,7 @@ def test_equations_without_bodies_have_curves_alone() -> None:
 
 
 @pytest.mark.parametrize("rest", [False, True])
-def test_points_are_told_from_other_outputs(rest: bool) -> None:
+def test_points_are_distinguished_from_other_outputs(rest: bool) -> None:
     system = systems.double_pendulum()
     q1, q2 = symdyn.coordinates("q1:3")
     system.add_output("tip", symdyn.position(system.bodies[1], [1.0, 0.2]))
@@ -278,7 +278,7 @@ def test_bodies_reach_to_their_points() -> None:
         assert sticks is not None and missed(sticks.lines[-1], solution.outputs["tip"]) < 1e-12
 
 
-def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
+def test_an_early_stop_is_reported_and_short_motions_are_drawn() -> None:
     module = motion("pendulum").module
     with pytest.warns(SimulationWarning):
         stopped = module.simulate((0.0, 1.0), max_steps=1)
@@ -518,7 +518,7 @@ def test_a_film_runs_backwards_with_its_motion() -> None:
     assert np.allclose(there, whole.centres[-1, -1], atol=1e-6)
 
 
-def test_films_that_cannot_be_are_refused(tmp_path: Path) -> None:
+def test_films_that_cannot_be_are_rejected(tmp_path: Path) -> None:
     solution = motion("pendulum")
     with pytest.raises(ArgumentError, match=r"film\.avi: the ending must be \.gif or \.mp4"):
         animate(solution, tmp_path / "film.avi")
@@ -559,7 +559,7 @@ def test_a_picture_takes_its_path_alone(tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
-def test_pictures_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
+def test_pictures_that_cannot_be_written_are_rejected(tmp_path: Path) -> None:
     solution = motion("pendulum")
     for give, message in (
             (lambda: solution.picture(0.5, tmp_path / "p.xyz"), r"cannot save the picture to p\.xyz: the ending must be \.png, "),
@@ -703,7 +703,7 @@ def test_no_display_and_no_pyplot(tmp_path: Path) -> None:
     assert done.stdout.split() == ["False"] and not done.stderr
 
 
-def test_without_matplotlib_the_way_to_it_is_told() -> None:
+def test_without_matplotlib_the_way_to_it_is_reported() -> None:
     done = run("import sys; sys.modules['matplotlib'] = None; " + MOVE + "s.plot()")
     assert done.returncode == 1
     assert "MissingExtra: pictures need matplotlib: pip install 'symdyn[plot]'" in done.stderr

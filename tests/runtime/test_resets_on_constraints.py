@@ -183,7 +183,7 @@ def test_a_reset_that_the_constraints_do_not_allow_is_an_error(backend: str, met
 
 @pytest.mark.parametrize(("backend", "method"), [("c", "dop853"), ("numpy", "RK45")])
 def test_a_speed_that_a_constraint_holds_cannot_be_reset(backend: str, method: str) -> None:
-    """At the bottom of a circle nothing goes up, also where rounding leaves it a little beside."""
+    """At the bottom of a circle nothing goes up, also where rounding leaves it a little off."""
     x, y = sd.coordinates("x y")
     system = sd.System("circling", gravity=[0, -9.81])
     rail, particle = system.add_body("rail", 1.0), system.add_body("particle", 1.0)

@@ -122,8 +122,8 @@ def test_changed_parameters_are_marked(report: Path, solution: Solution) -> None
     assert starts == pytest.approx(dict(zip(metadata.x, solution.x[0], strict=True)))
 
 
-def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Solution, module: Module,
-                                                  capsys: pytest.CaptureFixture[str]) -> None:
+def test_energy_balance_is_reported_where_it_is_known(report: Path, solution: Solution, module: Module,
+                                                      capsys: pytest.CaptureFixture[str]) -> None:
     balance = run_tables.energy(solution)
     assert balance is not None and abs(balance.work) > 0.1 and not balance.doubtful
     assert balance.work == solution.work[-1] and balance.change == solution.energy[-1] - solution.energy[0]
@@ -144,7 +144,7 @@ def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Soluti
 
 
 @pytest.mark.usefixtures("no_pictures")
-def test_a_run_that_stopped_early_is_told_and_text_is_escaped(module: Module, tmp_path: Path) -> None:
+def test_a_run_that_stopped_early_is_reported_and_text_is_escaped(module: Module, tmp_path: Path) -> None:
     with pytest.warns(SimulationWarning):
         stopped = module.simulate((0.0, 1.0), max_steps=2)
     stopped.message = "stopped <early> & told"
@@ -216,7 +216,7 @@ def test_curves_that_would_flatten_others_have_axes_of_their_own() -> None:
     assert len(embedded._apart(Panel("energy", "J", ["a", "b"], t * [1.0, 900.0], ["a", "b"], "energy"))) == 1
 
 
-def test_files_that_cannot_be_written_are_refused(solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_cannot_be_written_are_rejected(solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ArgumentError, match=r"cannot write the report to run.pdf: the ending must be \.html"):
         solution.report(tmp_path / "run.pdf")
     monkeypatch.setattr("symdyn.runtime.solutions.report.page", lambda solution: "")

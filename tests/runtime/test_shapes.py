@@ -419,7 +419,7 @@ def test_films_show_shapes(solution: Solution, tmp_path: Any) -> None:
     assert (np.abs(first - last).sum(axis=2) > 60).sum() > 1000
 
 
-def test_wrong_pictures_are_refused(solution: Solution) -> None:
+def test_wrong_pictures_are_rejected(solution: Solution) -> None:
     for arguments, message in (({"t": 3.0}, "goes from t = 0 s to 1 s; t = 3 s is outside"), ({"t": {}}, "t must be a time"),
                                ({"t": []}, "t must be a time or a list of times"),
                                ({"view": (100, 0)}, r"view is \(100, 0\); pass \(elevation, azimuth\)"),
@@ -432,7 +432,7 @@ def test_wrong_pictures_are_refused(solution: Solution) -> None:
         bare.simulate((0.0, 0.1)).picture()
 
 
-def test_a_colour_that_does_not_exist_is_told() -> None:
+def test_a_colour_that_does_not_exist_is_reported() -> None:
     system = buoy()
     system.draw("hull", S.Box([1, 1, 1]), color="blau")
     with pytest.raises(ArgumentError, match="buoy: a shape has the colour 'blau', which is none; pass '#rrggbb'"):
@@ -459,14 +459,14 @@ def test_a_colour_that_does_not_exist_is_told() -> None:
     (S.Box([sd.parameters("w"), 1, 1]), "Box of 'hull' uses w, which the mechanism does not have for a parameter; there are h"),
     (S.Box(["1", 1, 1]), "is the text '1'; text is never evaluated"), ("box", "a shape of 'hull' is 'box'"),
 ])
-def test_faults_of_shapes_are_told_with_numbers(shape: Any, message: str) -> None:
+def test_faults_of_shapes_are_reported_with_numbers(shape: Any, message: str) -> None:
     system = buoy()
     system.draw("hull", shape)
     with pytest.raises(ModelError, match=message):
         system.check()
 
 
-def test_other_faults_of_drawing_are_told() -> None:
+def test_other_faults_of_drawing_are_reported() -> None:
     system = buoy()
     system.draw("keel", S.Box([1, 1, 1]), color="#12")
     system.draw("hull")

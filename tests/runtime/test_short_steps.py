@@ -46,7 +46,7 @@ def stops(module: Any, match: str, **options: Any) -> Any:
 
 @pytest.mark.parametrize(("backend", "method"), swept(EXPLICIT_AND_NOT, ("c", "dop853"), ("c", "radau"), ("numpy", "LSODA")))
 def test_friction_in_a_function_of_the_user_stops_where_it_chatters(pushed: Any, backend: str, method: str) -> None:
-    """No expression tells where it jumps; rates to either side do."""
+    """No expression shows where it jumps; rates to either side do."""
     match = (r"block: stopped at t = 0.58\d*: input F chatters: the motion is driven onto a jump at x_dot = \S+ from both "
              r"sides, at rates of [23]\.?\d* and -[34]\.?\d* of its unit a second, and every step crosses it, \d+ steps took \S+ "
              r"s; make the jump smooth, for example by tanh\(x_dot/eps\) in place of sign\(x_dot\) with a small eps, or end the "

@@ -285,7 +285,7 @@ def slope(v: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def falling() -> Any:
-    """A body that falls into what a function of the user, in Python alone, refuses, and an event of it."""
+    """A body that falls into what a function of the user, in Python alone, rejects, and an event of it."""
     x = sd.coordinates("x")
     system = sd.System("falling", gravity=[0, -10])
     body = system.add_body("body", mass=1)

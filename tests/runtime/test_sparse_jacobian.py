@@ -98,7 +98,7 @@ def test_inputs_that_vary() -> None:
 
 
 @needs_c
-def test_dense_matrices_that_are_too_large_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dense_matrices_that_are_too_large_are_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "LARGEST_MATRICES", 8 * 4**2 * 7)
     module = sd.systems.get("double_pendulum").compile(backend="c")
     assert module.simulate((0, 0.1), method="radau").success

@@ -21,7 +21,7 @@ from tests.runtime.constrained import module as constrained
 
 @pytest.fixture(scope="module")
 def mass() -> Any:
-    """A mass that a spring k and a damper c hold to the point sin t, pushed by F + b q^3; beside it z' = 1 - sqrt z, resting.
+    """A mass that a spring k and a damper c hold to the point sin t, pushed by F + b q^3; next to it z' = 1 - sqrt z, resting.
 
     With b = F = 0 the distance q - sin t is that of a free oscillator: k and c do not show in q = sin t.
     """
@@ -269,7 +269,7 @@ def test_jacobian_of_what_is_integrated(name: str, field: RightSide, mass: Any) 
 # -- what stops it
 
 
-def test_faults_are_told_as_by_the_other_methods(mass: Any) -> None:
+def test_faults_are_reported_as_by_the_other_methods(mass: Any) -> None:
     with pytest.warns(SimulationWarning, match=r"stopped at t = 0\.5.*F is nan at t = 0\.5"):
         done = mass.simulate((0, 1), inputs=lambda t, x: [np.nan if t > 0.5 else 0.0], method="radau")
     assert not done.success and 0.49 < done.t[-1] <= 0.5

@@ -1,4 +1,4 @@
-"""Runs in Euler angles that pass near gimbal lock say so, and only those."""
+"""Runs in Euler angles that pass near gimbal lock warn, and only those."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def said(module: Any, u: list[float], **options: Any) -> list[str]:
 
 
 @pytest.mark.parametrize("options", [{}, {"steps": True}, {"method": "DOP853"}], ids=["outputs", "steps", "scipy"])
-def test_near_pass_is_told_with_time_and_what_to_do(angles: Any, options: dict[str, Any]) -> None:
+def test_near_pass_is_reported_with_time_and_what_to_do(angles: Any, options: dict[str, Any]) -> None:
     (text,) = said(angles, [0.0, 2.0, 1e-4], rtol=1e-9, **options)
     assert "near t = 0.785" in text and "the ZYX angles of joint ball came within" in text
     assert "exceed rtol = 1e-09" in text and "take EulerParameters, or another sequence" in text
@@ -53,8 +53,8 @@ def test_the_tolerance_decides(angles: Any, body: Any) -> None:
     assert said(angles, [0.3, 0.2, 0.1], rtol=1e-9) == []
 
 
-def test_the_stabilized_index_2_form_tells_it() -> None:
-    """Beside the body a cart that is held at its place, so that there is a constraint."""
+def test_the_stabilized_index_2_form_reports_it() -> None:
+    """Next to the body a cart that is held at its place, so that there is a constraint."""
     pytest.importorskip("solve_dae")
     system = free_body("angles")
     x = sd.coordinates("x")
@@ -69,7 +69,7 @@ def test_the_stabilized_index_2_form_tells_it() -> None:
 
 
 def test_many_motions_tell_it_at_the_states_that_are_kept(angles: Any) -> None:
-    """A quarter turn at 2 rad/s ends 1e-4/2 rad beside gimbal lock: the second motion of three is kept there."""
+    """A quarter turn at 2 rad/s ends 1e-4/2 rad from gimbal lock: the second motion of three is kept there."""
     options = {"u": [[0.3, 0.2, 0.1], [0.0, 2.0, 1e-4], [0.0, 1.0, 0.1]], "rtol": 1e-9}
     with pytest.warns(sd.SimulationWarning, match=r"in 1 of 3 motions, the first of them 1, the ZYX angles of joint ball came "
                                                   r"too near to gimbal lock, in motion 1 at t = 0\.785\d* within .* take EulerP"):

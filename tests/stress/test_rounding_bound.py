@@ -197,7 +197,7 @@ def test_accelerations_that_miss_their_equations_are_found(crank: SystemUnderTes
     assert len(imbalance(crank, rows[:0], u_dot[:0], "c")) == 0
 
 
-def test_towards_gimbal_lock_the_bound_holds_until_states_are_refused() -> None:
+def test_towards_gimbal_lock_the_bound_holds_until_states_are_rejected() -> None:
     turning = SystemUnderTest(attitude.free_body("angles"))
     x = np.zeros((5, 6))
     x[:, 0], x[:, 1], x[:, 2], x[:, 3:] = 0.3, math.pi / 2 - np.array([1e-9, 1e-7, 2e-7, 1e-6, 1.2]), 0.7, [0.3, 0.4, 0.5]
@@ -267,7 +267,7 @@ def test_states_without_a_bound_are_counted_over_all() -> None:
 
 
 @pytest.mark.parametrize("place", ["near", "singular"])
-def test_states_that_are_set_aside_are_told_and_judged(place: str) -> None:
+def test_states_that_are_set_aside_are_reported_and_judged(place: str) -> None:
     def rows(**told: Any) -> list:
         return list(set_aside(Named, [Finding("lam", -1.0, -1.0, **{place: Aside(**told)})]))  # type: ignore[arg-type]
 

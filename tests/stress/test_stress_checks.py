@@ -110,7 +110,7 @@ def test_only_states_next_to_lost_rank_or_singular_ones_are_set_aside() -> None:
     assert rounding.Measured(turning, "rhs", where).singular.tolist() == [True, False]
 
 
-def test_corrections_are_looked_at_beside_the_constraints(tied: SystemUnderTest) -> None:
+def test_corrections_are_checked_off_the_constraints(tied: SystemUnderTest) -> None:
     where = rounding.states(tied, 40)
     off = rounding.off_constraints(tied, where)
     sizes = [np.abs(tied.evaluate("C", w.t, w.x)[:, 0]) for w in (where, off)]
@@ -121,7 +121,7 @@ def test_corrections_are_looked_at_beside_the_constraints(tied: SystemUnderTest)
 
 
 @needs_c
-def test_refused_states_must_be_singular(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rejected_states_must_be_singular(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     original = rounding.evaluated
 
     def refuses(*given: Any) -> np.ndarray:
@@ -242,7 +242,7 @@ def test_end_that_depends_on_the_first_step_is_found(double: SystemUnderTest, mo
 
 
 @pytest.mark.parametrize("first", [1e-300, 5e-324, 1e9])
-def test_first_steps_that_cannot_be_are_mended_without_c_too(double: SystemUnderTest, first: float) -> None:
+def test_first_steps_that_cannot_be_are_corrected_without_c_too(double: SystemUnderTest, first: float) -> None:
     usual, odd = (double.module.simulate((0, 1), method="DOP853", rtol=1e-8, **given) for given in ({}, {"first_step": first}))
     assert odd.success and odd.n_steps < usual.n_steps + 60 and np.allclose(odd.x[-1], usual.x[-1], rtol=0, atol=1e-6)
 
@@ -277,7 +277,7 @@ def test_mass_ratios_find_noise(double: SystemUnderTest, monkeypatch: pytest.Mon
 
 
 class Stopped:
-    """What a stopped run tells."""
+    """Reports of a stopped run."""
 
     success, message = False, "cart: stopped at t = 0.5: gust is not finite; the state there: x = 1, x_dot = 2"
     t, x = np.array([0.0, 0.5]), np.zeros((2, 2))
@@ -381,7 +381,7 @@ def test_redundant_constraints_that_change_something_are_found(monkeypatch: pyte
 @pytest.mark.parametrize(("change", "told"), [({"success": True}, "it does not stop"), ({"message": "stopped at t = 0.5: a value "
                                               "is not finite; the state there: x = 1, x_dot = 0"}, "does not name gust")])
 @needs_c
-def test_failing_forces_that_are_not_told_are_found(change: dict[str, Any], told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreported_failures_of_forces_are_found(change: dict[str, Any], told: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Silent(SystemUnderTest):
         def run(self, *arguments: Any, **options: Any) -> Any:
             sol = super().run(*arguments, **options)

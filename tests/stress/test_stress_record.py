@@ -60,7 +60,7 @@ def test_numbers_that_json_lacks_are_text(tmp_path: Path) -> None:
     assert json.loads(text, parse_constant=lambda name: pytest.fail(name))["rows"][0]["figure"] == "inf"
 
 
-def test_page_folds_what_passes_and_tells_what_verdicts_mean(tmp_path: Path) -> None:
+def test_page_folds_what_passes_and_explains_verdicts(tmp_path: Path) -> None:
     report = StressReport([row(), row(check="units"), row(DEGRADE), row(FAIL)])
     page = report.save(tmp_path / "s.html").read_text(encoding="utf-8")
     assert page.index("fail: 1</h2>") < page.index("degrade: 1</h2>") < page.index("pass: 2</h2>")
@@ -69,7 +69,7 @@ def test_page_folds_what_passes_and_tells_what_verdicts_mean(tmp_path: Path) -> 
         assert meaning in page and f"{verdict}: " in report.table()
 
 
-def test_parameters_without_numbers_are_told() -> None:
+def test_parameters_without_numbers_are_reported() -> None:
     bare = sd.System("bare", gravity=[0, -9.81])
     q, m = sd.coordinates("q"), sd.parameters("m")
     bare.add_joint(sd.Revolute("hinge", bare.ground, bare.add_body("rod", mass=m, com=[1, 0]), q))
@@ -78,14 +78,14 @@ def test_parameters_without_numbers_are_told() -> None:
             sd.stress(system, short=True, checks=["rounding"])
 
 
-def test_unknown_check_is_told_with_near_ones() -> None:
+def test_unknown_check_is_reported_with_near_ones() -> None:
     with pytest.raises(sd.ArgumentError, match="there is no check 'rouding'; did you mean rounding"):
         sd.stress("pendulum", checks=["rouding"])
     with pytest.raises(sd.ArgumentError, match="the checks flips have mechanisms of their own; leave out the system"):
         sd.stress("pendulum", checks=["energy", "flips"])
 
 
-def test_what_is_no_mechanism_or_no_list_is_told() -> None:
+def test_what_is_no_mechanism_or_no_list_is_reported() -> None:
     for arguments, told in (({"system": 3}, "stress was given 3; pass a System"), ({"system": ["pendulum", "nope"]},
                              "there is no mechanism 'nope'; there are"),
                             ({"system": "n_link_pendulum(x)"}, "option n of n_link_pendulum must be of the kind int"),
@@ -172,7 +172,7 @@ def test_list_names_every_check(capsys: Any) -> None:
     assert all(name in told for name in stress_run.CHECKS) and "any mechanism" in told
 
 
-def test_a_question_that_is_wrong_is_told_before_the_table(tmp_path: Path, capsys: Any) -> None:
+def test_a_question_that_is_wrong_is_reported_before_the_table(tmp_path: Path, capsys: Any) -> None:
     for asked, why in ((["--checks", "zork"], "there is no check 'zork'"), (["pendulum", "--checks", "flips"], "of their own")):
         assert main(["stress", *asked, "--output", str(tmp_path)]) == 2
         told = capsys.readouterr()
@@ -211,7 +211,7 @@ def test_processes_end_silently_when_interrupted(tmp_path: Path) -> None:
     assert "unfinished: " in out and (tmp_path / "stress.html").exists()
 
 
-def test_a_motion_that_stops_is_told_once() -> None:
+def test_a_motion_that_stops_is_reported_once() -> None:
     def fails(v: np.ndarray) -> np.ndarray:
         return np.where(v > 0.5, np.nan, 1.0)
 

@@ -1,4 +1,4 @@
-"""Where the usual motion begins: faults of a description told once, starts that are moved, motions that stand still."""
+"""Where the usual motion begins: faults of a description reported once, starts that are moved, motions that stand still."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def crane(**initial: float) -> sd.System:
 
 @needs_c
 @pytest.mark.native
-def test_code_that_does_not_compile_is_told_once_with_what_the_compiler_says() -> None:
+def test_code_that_does_not_compile_is_reported_once_with_what_the_compiler_says() -> None:
     text = "static int gust(const double *in, double *out) { out[0] = in[0] +; return 0; }"
     report = sd.stress(cart(lambda x: sd.External("gust", ["v"], c=text, python=gust)(x.dot)), short=True)
     (told,) = report.rows
@@ -65,7 +65,7 @@ def test_code_that_does_not_compile_is_told_once_with_what_the_compiler_says() -
 @pytest.mark.parametrize(("system", "told"), [
     (lambda: cart(lambda x: 1 / x), "the result is not finite; at t = 0, x = 0, x_dot = 0"),
     (lambda: massless(), "the mass matrix is not positive definite")])
-def test_accelerations_that_there_are_not_are_told_once(system: Any, told: str) -> None:
+def test_accelerations_that_there_are_not_are_reported_once(system: Any, told: str) -> None:
     report = sd.stress(system(), short=True, checks=["energy", "denormals", "masses"])
     (row,) = report.rows
     assert (row.check, row.verdict) == ("start", FAIL) and told in row.why and "at the start" in row.done
@@ -76,7 +76,7 @@ def breaks(v: np.ndarray) -> np.ndarray:
     raise ValueError("no data")
 
 
-def test_what_a_function_of_the_user_raises_is_told_as_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_function_of_the_user_raises_is_reported_as_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SYMDYN_CC", "none")
     text = "static int breaks(const double *in, double *out) { out[0] = in[0]; return 0; }"
     report = sd.stress(cart(lambda x: sd.External("breaks", ["v"], c=text, python=breaks)(x.dot)), short=True)
@@ -90,7 +90,7 @@ def massless() -> sd.System:
     return system
 
 
-def test_a_description_with_faults_is_told_before_anything_is_run() -> None:
+def test_a_description_with_faults_is_reported_before_anything_is_run() -> None:
     system = sd.System("loose")
     system.add_body("floating", mass=1)
     with pytest.raises(sd.ModelError, match="floating"):
@@ -100,7 +100,7 @@ def test_a_description_with_faults_is_told_before_anything_is_run() -> None:
 # -- the start
 
 
-def test_a_start_beside_the_constraints_is_moved_and_told() -> None:
+def test_a_start_off_the_constraints_is_moved_and_reported() -> None:
     system = sd.systems.four_bar()
     kept = SystemUnderTest(system)
     assert list(start(kept)) == []
@@ -118,7 +118,7 @@ def test_a_start_beside_the_constraints_is_moved_and_told() -> None:
 # -- motions that stand still
 
 
-def test_checks_of_a_motion_that_stands_still_are_left_out_and_told() -> None:
+def test_checks_of_a_motion_that_stands_still_are_left_out_and_reported() -> None:
     report = sd.stress(crane(), short=True, checks=["energy", "reversal", "divergence", "units", "steps"])
     (row,) = report.rows
     assert (row.check, row.verdict) == ("usual motion", DEGRADE) and "stands still" in row.done and "system.initial" in row.why

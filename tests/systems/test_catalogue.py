@@ -61,7 +61,7 @@ CASES = [
 
 
 class Pair(NamedTuple):
-    """A compiled system beside its oracle."""
+    """A compiled system with its oracle."""
 
     system: Any
     module: Any

@@ -15,7 +15,7 @@ from symdyn.tape.evaluate import evaluate
     ("double_pendulum", {}, 37), ("puma560", {}, 633),
 ])
 def test_operations_of_the_right_hand_side(name, options, most):
-    """A change that needs more operations than before must say so here."""
+    """A change that needs more operations than before must be entered here."""
     tape = sd.systems.get(name, **options).embedding().tape("rhs")
     assert tape.operations <= most
 
@@ -27,7 +27,7 @@ def test_leanest_candidate(name):
     assert min(c.operations for c in case.make().equations().candidates) <= case.bound.operations
 
 
-def test_inverse_dynamics_of_an_arm_beside_published_code():
+def test_inverse_dynamics_of_an_arm_against_published_code():
     assert arm.misses() == [] and sum(arm.counts(grouped=True)) < sum(arm.counts(grouped=False))
 
 

@@ -100,7 +100,7 @@ def test_it_keeps_its_energy_while_the_cargo_swings(hook: Any) -> None:
     assert solution["phi"].max() > 0.2 and solution.energy_error() < 1e-8
 
 
-def test_other_cargo_is_refused() -> None:
+def test_other_cargo_is_rejected() -> None:
     for cargo in ("sunk", ["hook"]):
         with pytest.raises(sd.ModelError, match=f"has no cargo {re.escape(repr(cargo))}; pass 'hook' or 'deck' or 'ashore'"):
             sd.systems.floating_crane(cargo)  # type: ignore[arg-type]

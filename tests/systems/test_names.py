@@ -60,7 +60,7 @@ def test_unknown_name_offers_the_nearest() -> None:
 
 @pytest.mark.parametrize(("name", "options"), [("n_link_pendulum", {"n": 0}), ("spatial_chain", {"n": 0}),
                                                ("prismatic_chain", {"n": -1}), ("puma560", {"convention": "craig"})])
-def test_impossible_options_are_refused(name: str, options: dict) -> None:
+def test_impossible_options_are_rejected(name: str, options: dict) -> None:
     with pytest.raises(sd.ModelError, match=name):
         sd.systems.get(name, **options)
 

@@ -209,7 +209,7 @@ def test_the_moored_barge_floats_where_weight_and_mooring_are_carried(moored: An
 
 
 def test_ballast_that_keeps_it_upright_in_the_wind(moored: Any) -> None:
-    """The moment of the ballast is what keeps the pitch at zero, beside the moments of wind and mooring about y."""
+    """The moment of the ballast is what keeps the pitch at zero, together with the moments of wind and mooring about y."""
     found = moored.equilibrium(free=["x", "y", "z", "psi", "theta", "phi", "yaw", "m_x"], fixed={"theta": 0.0, "azimuth": 0.0},
                                inputs={"v_w": 8.0})
     assert found.stable and list(found.solved) == ["m_x"] and found.solved["m_x"] < -5e4  # upwind
@@ -224,7 +224,7 @@ def test_ballast_that_keeps_it_upright_in_the_wind(moored: Any) -> None:
 
 @pytest.mark.parametrize("wind", [0.0, 1.0, 4.0, 6.0, 8.0, 10.0, 11.0])
 def test_two_ballasts_keep_pitch_and_roll_at_zero(moored: Any, wind: float) -> None:
-    """Without wind nothing is to be balanced in roll; the conditions may be named, or told by what the ballasts act on."""
+    """Without wind nothing is to be balanced in roll; the conditions may be named, or follow from what the ballasts act on."""
     fixed = {"theta": 0.0, "phi": 0.0, "azimuth": 0.0}
     free = ["x", "y", "z", "psi", "theta", "phi", "yaw", "m_x", "m_y"]
     found = moored.equilibrium(free=free, fixed=fixed, inputs={"v_w": wind})

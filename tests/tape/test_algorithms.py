@@ -181,7 +181,7 @@ def test_c_and_python_give_the_same_bits_and_reject_the_same(name: str, in_c: Co
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_generated_python_has_the_text_of_the_package(name: str) -> None:
-    """The same bits; what is rejected raises, and tells at which states."""
+    """The same bits; what is rejected raises, with the states at which it does."""
     intrinsic, inputs = KERNELS[name]
     values = inputs()[::3]
     recorder = Recorder()

@@ -114,12 +114,12 @@ def test_what_has_no_counterpart_is_named(expression: sp.Expr) -> None:
     assert any(str(part) in message for part in sp.preorder_traversal(expression))
 
 
-def test_piecewise_without_default_is_refused() -> None:
+def test_piecewise_without_default_is_rejected() -> None:
     with pytest.raises(UnsupportedExpression, match=r"not defined everywhere; end the Piecewise with \(value, True\)"):
         _record(sp.Piecewise((x, x > 0), (y, y > 0)))
 
 
-def test_division_by_zero_is_refused() -> None:
+def test_division_by_zero_is_rejected() -> None:
     recorder = Recorder()
     with pytest.raises(ZeroDivisionError):
         record_expression(recorder, 1 / x, {x: 0})

@@ -283,7 +283,7 @@ FAILS = {"straight above": (0, (0.0, 0.5, 1e-3, 0.0)), "on the seabed": (1, (0.9
 
 
 @pytest.mark.parametrize("name", FAILS)
-def test_what_has_no_shape_is_refused(name: str) -> None:
+def test_what_has_no_shape_is_rejected(name: str) -> None:
     """By NaN where a tape is evaluated, by a code in generated code, while recording for numbers."""
     seabed, case = FAILS[name]
     assert np.all(np.isnan(solved(seabed, case)))

@@ -215,7 +215,7 @@ def test_generated_code(evaluator: Any) -> None:
 
 
 @pytest.mark.parametrize("e", [[0.1, 0.0, 0.0, 0.0], [np.nan, 0.0, 0.0, 1.0], [0.1, np.nan, 0.0, 1.0], [0.1, 1.0, 0.0, np.nan]])
-def test_no_depth_is_told(evaluator: Any, e: list[float]) -> None:
+def test_no_depth_is_reported(evaluator: Any, e: list[float]) -> None:
     with pytest.raises(EvaluationError, match=REASON):
         evaluator.one(0.0, np.zeros(0), np.array(e))
     with pytest.raises(EvaluationError, match=REASON):

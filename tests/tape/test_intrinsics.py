@@ -206,7 +206,7 @@ def unheld() -> Problem:
 
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])
-def test_a_speed_that_nothing_holds_is_told(backend: str) -> None:
+def test_a_speed_that_nothing_holds_is_reported(backend: str) -> None:
     given = unheld()
     evaluator = unit_of(*taped(Saddle(given.sizes, "nothing holds a speed"), len(given.for_saddle)), backend).evaluator("solve")
     evaluator.set_params(np.zeros(0))
@@ -230,7 +230,7 @@ def test_what_nothing_holds_is_singular_with_many_digits() -> None:
         precisely(Saddle(given.sizes, ""), given.for_saddle)
 
 
-def test_bound_numbers_that_hold_nothing_are_told() -> None:
+def test_bound_numbers_that_hold_nothing_are_reported() -> None:
     given = unheld()
     tape, names = taped(Saddle(given.sizes, "nothing holds a speed"), len(given.for_saddle), PARAMETER)
     with pytest.raises(EvaluationError, match="with the numbers that are bound: nothing holds a speed"):

@@ -210,13 +210,13 @@ def test_conditions_on_numbers_are_decided(r: Recorder, xyz: list[Node]) -> None
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, np.float64("nan"), np.float32("inf"), Decimal("NaN")])
-def test_numbers_that_are_not_finite_are_refused(r: Recorder, xyz: list[Node], bad: Any) -> None:
+def test_numbers_that_are_not_finite_are_rejected(r: Recorder, xyz: list[Node], bad: Any) -> None:
     for record in (lambda: r.add(xyz[0], bad), lambda: r.mul(bad, xyz[0]), lambda: r.apply("sin", bad), lambda: exact(bad)):
         with pytest.raises(ValueError, match="finite real number, found"):
             record()
 
 
-def test_division_by_zero_is_refused(r: Recorder, xyz: list[Node]) -> None:
+def test_division_by_zero_is_rejected(r: Recorder, xyz: list[Node]) -> None:
     with pytest.raises(ZeroDivisionError, match="divides by zero"):
         xyz[0] / 0
     with pytest.raises(ZeroDivisionError, match="divides by zero"):
@@ -233,7 +233,7 @@ def test_numpy_numbers_and_arrays(xyz: list[Node]) -> None:
 
 @pytest.mark.parametrize("operate", [lambda x: x + "1", lambda x: "1" * x, lambda x: x - None, lambda x: [1] / x,
                                      lambda x: x**"2"])
-def test_other_types_are_refused(xyz: list[Node], operate: Any) -> None:
+def test_other_types_are_rejected(xyz: list[Node], operate: Any) -> None:
     with pytest.raises(TypeError):
         operate(xyz[0])
 
@@ -265,6 +265,6 @@ def test_names_and_sections(r: Recorder, xyz: list[Node]) -> None:
     assert r.names == {a: "v_1", b: "w_xx", c: "w_xy", x * z: "s", x + z: "n_1_1", y + z: "n_2_2"}
 
 
-def test_repr_tells_the_operation(r: Recorder, xyz: list[Node]) -> None:
+def test_repr_has_the_operation(r: Recorder, xyz: list[Node]) -> None:
     product = r.name("p", xyz[0] * xyz[1])
     assert repr(product) == "<p: mul(x, y)>"

@@ -1,4 +1,4 @@
-"""sd.read_urdf: what becomes of a file's elements, and what faulty files are told."""
+"""sd.read_urdf: what becomes of a file's elements, and what is reported of faulty files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def read(folder: Path, text: str, **options: object) -> sd.System:
 
 
 def faults(folder: Path, text: str, **options: object) -> list[str]:
-    """What is told of a file, each as LINE: FAULT."""
+    """Faults reported of a file, each as LINE: FAULT."""
     with pytest.raises(ModelError) as raised:
         read(folder, text, **options)
     path = f"{folder / 'robot.urdf'}:"
@@ -195,7 +195,7 @@ def test_every_fault_of_the_file_in_one_message(tmp_path: Path) -> None:
      ["3: joint 'j': parent has no link; write <parent link=\"...\">", "3: joint 'j' has no child; write <child link=\"...\"/>"]),
     ([link("a"), link("b"), joint("j", "revolute", "a", "b"), joint("j", "revolute", "a", "b")],
      ["5: the joint 'j' is there already, in line 4; give each a name of its own"]),
-    # what follows from a joint without a name of its own is not told, too
+    # consequences of a joint without a name are not reported, too
     ([link("a"), link("b"), link("c"), joint("j", "revolute", "a", "b"), joint("j", "revolute", "b", "c")],
      ["6: the joint 'j' is there already, in line 5; give each a name of its own"]),
     ([link("a"), link("b"), joint("", "fixed", "a", "b")], ["4: a joint has no name; write <joint name=\"...\">"]),

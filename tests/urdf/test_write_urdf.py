@@ -140,7 +140,7 @@ def fault_of(change: Callable[[sd.System], object]) -> str:
     return fault
 
 
-def test_gravity_that_is_not_what_is_read_is_told(tmp_path: Path) -> None:
+def test_gravity_that_is_not_what_is_read_is_reported(tmp_path: Path) -> None:
     system = sd.System("side", gravity=[0, -9.81, 0])
     bar = system.add_body("bar", mass=1, inertia=[1, 1, 1], com=[1, 0, 0])
     system.add_joint(sd.Revolute("hinge", system.ground, bar, sd.coordinates("q"), axis=[0, 0, 1]))

@@ -213,7 +213,7 @@ def test_rounding_in_joints_without_forces_is_no_arrow() -> None:
     assert arrows_of(solution, 1.0)[0].scale < weights.scale
 
 
-def test_colours_of_arrows_can_be_told_apart() -> None:
+def test_colours_of_arrows_can_be_distinguished() -> None:
     """By readers who see all colours, and by those without long or middle cones (Machado, Oliveira and Fernandes, 2009): by 15 of
     CIELAB, of which 2 can just be seen."""
     no_long = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])

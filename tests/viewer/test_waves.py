@@ -84,7 +84,7 @@ def test_the_turbine_with_waves_shows_them() -> None:
 @pytest.mark.parametrize("waves, message", [((1, 2), r"waves has 2 entries; pass \(amplitude, frequency, length\)"),
                                             ((1, 2, 0), "length of waves is 0; pass a positive length, m"),
                                             (("1", 2, 3), "is the text '1'; text is never evaluated")])
-def test_faults_of_waves_are_told(waves: tuple[object, ...], message: str) -> None:
+def test_faults_of_waves_are_reported(waves: tuple[object, ...], message: str) -> None:
     system = floating()
     system.draw(system.ground, sd.shapes.Water(waves=waves))
     with pytest.raises(ModelError, match=message):

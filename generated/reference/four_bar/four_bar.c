@@ -35,7 +35,7 @@
 // Skipped: 30 operations on parameters only: hoisted into the prologue, run once a simulation.
 //
 // To use it: compute the constants once with four_bar_prologue, then call the functions; each returns 0, or a code
-// that four_bar_reason explains. Nothing is allocated, nothing is global. main.c beside this file is an example.
+// that four_bar_reason explains. Nothing is allocated, nothing is global. main.c next to this file is an example.
 
 // What all parts need: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
 
@@ -118,7 +118,7 @@ enum { SYMDYN_INPUT_STOPPED = 100000 };
 // the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
 // angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
-// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
+// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted again each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     union {
         double value;
@@ -315,7 +315,7 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
 // x (n) of M x + C^T lam = f, C x = d; M (n x n) symmetric, perhaps singular; the m rows of C perhaps dependent.
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
-// residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
+// residual again. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
 SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
 #if SYMDYN_SADDLE_ONE_SIZE
     n = SYMDYN_SADDLE_N;
@@ -1647,7 +1647,7 @@ typedef struct {
     int dense_ready, unstored;                // what is needed within the latest step is prepared; (t, x) is not stored yet
     int rejected, status;                     // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
-    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // The latest evaluation that failed, and the run where status < 0. reason: what a function returned, 0: results not finite,
     // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
     int reason;
     long bad_index;

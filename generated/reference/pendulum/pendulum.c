@@ -18,7 +18,7 @@
 // Skipped: 3 operations on parameters only: hoisted into the prologue, run once a simulation.
 //
 // To use it: compute the constants once with pendulum_prologue, then call the functions; each returns 0, or a code
-// that pendulum_reason explains. Nothing is allocated, nothing is global. main.c beside this file is an example.
+// that pendulum_reason explains. Nothing is allocated, nothing is global. main.c next to this file is an example.
 
 // What all parts need: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
 
@@ -90,7 +90,7 @@ enum { SYMDYN_INPUT_STOPPED = 100000 };
 // the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
 // angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
-// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
+// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted again each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     union {
         double value;
@@ -537,7 +537,7 @@ typedef struct {
     int dense_ready, unstored;                // what is needed within the latest step is prepared; (t, x) is not stored yet
     int rejected, status;                     // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
-    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // The latest evaluation that failed, and the run where status < 0. reason: what a function returned, 0: results not finite,
     // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
     int reason;
     long bad_index;

@@ -120,7 +120,7 @@ class Walk:
                     job.timing.runs.clear()
 
     def _renew(self, job: Job, rows: list[Row], k: int) -> None:
-        with contextlib.suppress(SymdynError):  # the row of the earlier run stays, and says so
+        with contextlib.suppress(SymdynError):  # the row of the earlier run stays, with a mark
             row = job.run()
             if not row.message:
                 rows[k] = row

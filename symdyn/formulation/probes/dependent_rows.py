@@ -24,7 +24,7 @@ TRIES = 4
 REPLACED = 1e-6
 # Parts that differ by less of themselves are the same.
 ALIKE = 1e-9
-# Derivatives smaller than this part of those beside a state vanish there.
+# Derivatives smaller than this part of those near a state vanish there.
 VANISHING = 1e-5
 
 

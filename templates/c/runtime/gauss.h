@@ -138,7 +138,8 @@ static double symdyn_halved(symdyn_run *run, double h, const double *x_new) {
 
 // Coefficients of the slopes in Legendre polynomials fall off at a rate that the last two tell; of twice as many the last one is
 // about the error, within a factor of 10 over 10 decades for pendulums and chains. At a kink they stop to fall off: where those
-// of degrees 5 to 7 are not small beside 3 and 4, rough becomes the square of the error that the rate between these would make.
+// of degrees 5 to 7 are not small compared with 3 and 4, rough becomes the square of the error that the rate between these would
+// make.
 static double symdyn_error(const symdyn_run *run, const double *x_new, double *rough) {
     double all = 1e-300, last[2] = {0.0, 0.0};
     for (int k = 0; k < SYMDYN_NX; k++) {

@@ -29,7 +29,7 @@ typedef struct {
     int dense_ready, unstored;                // what is needed within the latest step is prepared; (t, x) is not stored yet
     int rejected, status;                     // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
-    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // The latest evaluation that failed, and the run where status < 0. reason: what a function returned, 0: results not finite,
     // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
     int reason;
     long bad_index;

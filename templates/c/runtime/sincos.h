@@ -17,7 +17,7 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
 // the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
 // angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
-// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
+// (of the sine: the relative error times z); they are rounded one after the other, the rest fitted again each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     union {
         double value;

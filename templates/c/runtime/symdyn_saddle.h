@@ -32,7 +32,7 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
 // x (n) of M x + C^T lam = f, C x = d; M (n x n) symmetric, perhaps singular; the m rows of C perhaps dependent.
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
-// residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
+// residual again. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
 SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
 #if SYMDYN_SADDLE_ONE_SIZE
     n = SYMDYN_SADDLE_N;

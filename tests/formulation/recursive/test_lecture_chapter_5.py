@@ -1,4 +1,4 @@
-"""The examples of the lecture's chapters 5 and 6.4, typed from the slides, beside what the recursions give.
+"""The examples of the lecture's chapters 5 and 6.4, typed from the slides, compared with the recursions.
 
 Slides are named by chapter and title. Where a slide is wrong, what it prints stands in a comment and the right result in
 the test.
@@ -239,8 +239,9 @@ def test_motion_subspaces() -> None:
     """6.4, "Define S matrix according to the joint": revolute, prismatic, spherical, 6-DOF.
 
     The slides of the spherical and 6-DOF joint write q_dot for speeds that are no derivatives of coordinates ("Caution!" on the
-    last one says so): the angular velocity, and the velocity in the axes of b2. The 6-DOF slides print "+" before the written-out
-    S q_dot, where "=" is meant, and X v - S q_dot for X v + S q_dot. Here the linear speeds of the 6-DOF joint come first.
+    last one marks this): the angular velocity, and the velocity in the axes of b2. The 6-DOF slides print "+" before the
+    written-out S q_dot, where "=" is meant, and X v - S q_dot for X v + S q_dot. Here the linear speeds of the 6-DOF joint
+    come first.
     """
     s = sd.System("joints")
     bodies = [s.add_body(f"b{k}", mass=1, inertia=[1, 1, 1]) for k in range(4)]
@@ -257,7 +258,7 @@ def test_motion_subspaces() -> None:
 
 
 def test_n_link_pendulum() -> None:
-    """Three rods, by hand in the way of chapter 5.5, beside the recursions' printed torques."""
+    """Three rods, by hand in the way of chapter 5.5, compared with the recursions' printed torques."""
     p = page("n_link_pendulum", n=3)
     s = symbols(p)
     q, u, ud = [[s[f"q{k}{end}"] for k in (1, 2, 3)] for end in ("", "_dot", "_ddot")]

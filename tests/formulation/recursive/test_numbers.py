@@ -90,7 +90,7 @@ def test_what_does_not_fit_is_named(arm: NumericTree) -> None:
         NumericTree(s.check()).at([0], [0])
 
 
-def test_gimbal_lock_and_singular_joints_are_told() -> None:
+def test_gimbal_lock_and_singular_joints_are_reported() -> None:
     s = sd.System("top")
     s.add_joint(sd.Spherical("socket", s.ground, s.add_body("top", mass=1, inertia=[1, 1, 1]), sd.coordinates("a b c"),
                              sd.EulerAngles("ZYX", "body")))
