@@ -1,4 +1,4 @@
-"""What generated code documents of itself: names, sizes, units, shapes; of a module also constraints, events, joints, switches.
+"""Metadata of generated code: names, sizes, units, shapes; of a module also constraints, events, joints, switches.
 
 One record, made once from the equations and read by the runtime. It is plain data, goes to JSON and back, and knows no SymPy, so
 that modules travel to other processes and machines.
@@ -39,7 +39,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Metadata:
-    """What one piece of generated code documents of itself.
+    """Metadata of one piece of generated code.
 
     q, u, z, ud, inputs, parameters   names, in the order of the arguments; units: by name, "" where there is none
     defaults     of the parameters, None where there is none; initial: values of q, u, z and inputs, by name
@@ -195,7 +195,7 @@ class ValidityRange(NamedTuple):
 
 @dataclass(frozen=True)
 class ModuleMetadata(Metadata):
-    """What a module documents of its mechanism, besides what its code does.
+    """Metadata of a module: those of its code, and of its mechanism.
 
     functions     that can be made; conservative: whether no load but gravity and springs does work; duration: of a motion, s
     constraints   labels of the rows; holonomic: whether each is one of positions

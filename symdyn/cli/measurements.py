@@ -14,8 +14,8 @@ from symdyn.cli.values import path
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a word: the parameter of the function that takes it, its flag ("" for what stands without one), what argparse
-    is reported besides."""
+    """An option of a word: the parameter of the function that takes it, its flag ("" for what stands without one), and further
+    settings of argparse."""
 
     parameter: str
     flag: str

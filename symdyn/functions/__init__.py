@@ -1,1 +1,1 @@
-"""The functions of a module: what there is, the tapes behind them, and what generated code documents of them."""
+"""The functions of a module: their table, the tapes behind them, and their metadata in generated code."""

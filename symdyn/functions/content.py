@@ -89,7 +89,7 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
-    """What a module documents of its mechanism, with what the code of its right-hand side documents of itself."""
+    """Metadata of a module: of its mechanism, and of the code of its right-hand side."""
     rates = tuple(given_rates(equations, ("rhs",)))
     parts = {f.name: getattr(of_code, f.name) for f in fields(Metadata)} | {"ud": rates, "outputs": output_shapes(equations)}
     return ModuleMetadata(

@@ -81,8 +81,8 @@ def frames_of(value: Any) -> list[Any]:
 def components(value: Any, frame: Any, what: str) -> sp.Matrix:
     """Components in a frame: (3, 1) of a vector, (3, 3) of a dyadic.
 
-    Raises ModelError, which documents what to write, where no frame is known (None, or the name of a body) and for what is
-    written in other frames.
+    Raises ModelError, with what to write in place of it, where no frame is known (None, or the name of a body) and for vectors
+    in other frames.
     """
     kind = "vector" if is_sympy_vector(value) else "dyadic"
     written = frames_of(value)

@@ -1579,7 +1579,7 @@ typedef struct {
 // A run of the integrator: its memory, failures, the right-hand side, norms. Nothing is allocated or global: a run lives in one
 // struct, and one that was interrupted continues to the same bits.
 
-// What a run reports of itself.
+// Report of a run.
 
 typedef struct {
     int status;                               // DONE, STEP_LIMIT, ..., or a failure

@@ -144,7 +144,7 @@ typedef struct {
     double length;  // that residuals are measured by, m
 } symdyn_problem;
 
-// What a run reports of itself.
+// Report of a run.
 
 typedef struct {
     int status;                               // DONE, STEP_LIMIT, ..., or a failure

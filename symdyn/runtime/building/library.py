@@ -50,7 +50,7 @@ class Library(Protocol):
 
     @property
     def metadata(self) -> Metadata:
-        """What the code documents of itself."""
+        """Metadata of the code."""
 
     def evaluator(self, name: str) -> Evaluator:
         """A new evaluator of one function."""
@@ -188,7 +188,7 @@ class PythonLibrary:
 
     @functools.cached_property
     def metadata(self) -> Metadata:
-        """What the code documents of itself. Raises SymdynError where it was written by another version."""
+        """Metadata of the code. Raises SymdynError where it was written by another version."""
         return Metadata.of_plain(self.module.METADATA)
 
     @classmethod

@@ -14,7 +14,7 @@ STATUS = SimpleNamespace(**codes_of("runtime/status.h"))
 
 
 class RunReport(ctypes.Structure):
-    """What a run reports of itself; see c/runtime/report_type.h."""
+    """Report of a run; see c/runtime/report_type.h."""
 
     _fields_ = fields_of("runtime/report_type.h")
 

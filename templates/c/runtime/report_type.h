@@ -1,4 +1,4 @@
-// What a run reports of itself.
+// Report of a run.
 #pragma once
 
 typedef struct {
