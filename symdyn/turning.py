@@ -17,6 +17,11 @@ def is_angle(coordinate_unit: str | None) -> bool:
     return coordinate_unit in ("rad", "1")
 
 
+def in_radians(coordinate_unit: str | None) -> bool:
+    """Whether a coordinate in this unit is an angle in rad, so that it is the same after 2 pi."""
+    return coordinate_unit == "rad"
+
+
 def force_unit(speed_unit: str | None) -> str:
     """The unit of what does work along a speed in this unit, "" where it is not known: a moment, a force."""
     return "N m" if turns(speed_unit) else "N" if speed_unit == "m/s" else ""

@@ -28,6 +28,7 @@ from symdyn.kinds import flag
 from symdyn.shown import shown
 from symdyn.spatial.vectors import inner, vector
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.intrinsics import RANK
 from symdyn.tape.node import Node, is_zero
 from symdyn.tape.tape import Tape
 
@@ -229,7 +230,7 @@ class _Search:
             return direct
         chosen: list[int] = []
         for row in sorted(range(len(J)), key=lambda i: (sum(isinstance(e, Node) for e in J[i, columns]), i)):
-            if np.linalg.matrix_rank(A[np.ix_([*chosen, row], columns)], tol=1e-9) > len(chosen):
+            if np.linalg.matrix_rank(A[np.ix_([*chosen, row], columns)], tol=RANK) > len(chosen):
                 chosen.append(row)
         if len(chosen) < len(columns):
             return None

@@ -24,14 +24,15 @@ from symdyn.errors import ArgumentError, SymdynError
 from symdyn.exact.prove import drawn_state
 from symdyn.spatial.vectors import zeros
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.intrinsics import RANK
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape
 
 if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
 
-# Digits of the numbers by which dependent speeds are chosen, and what is zero for the rank of matrices of them.
-DIGITS, RANK = 30, 1e-9
+# Digits of the numbers by which dependent speeds are chosen.
+DIGITS = 30
 
 
 @dataclass(frozen=True, eq=False)

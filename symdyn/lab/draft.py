@@ -22,6 +22,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import SEQUENCES
 from symdyn.model.symbols import Coordinate, Speed
+from symdyn.turning import in_radians
 
 # What joints and loads take as a number.
 Expression: TypeAlias = float | sp.Expr
@@ -231,7 +232,7 @@ class Draft:
         self.values |= dict(zip(parameters, (e / np.linalg.norm(e)).tolist() if len(e) else [], strict=True))
         for q in own:
             if q not in parameters:
-                self.values[q] = self.signed(0.3, 1.1) if units[q] == "rad" else self.signed(0.1, 0.5)
+                self.values[q] = self.signed(0.3, 1.1) if in_radians(units[q]) else self.signed(0.1, 0.5)
 
     # -- closed loops
 

@@ -28,6 +28,7 @@ from symdyn.statics.manifold import (
 )
 from symdyn.statics.steady import depends_on_time
 from symdyn.statics.terms import OperatingPoint, coordinate_names, rest
+from symdyn.turning import in_radians
 
 # Numbers of steps that are tried; the highest harmonics must be this part of all.
 STEPS, SMOOTH = (16, 32, 64, 128), 1e-11
@@ -400,7 +401,7 @@ def _left_open(course: Course) -> np.ndarray:
     metadata = before.module.metadata
     gap = after.q - before.q
     for k, name in enumerate(metadata.q):
-        if metadata.units.get(name) == "rad":
+        if in_radians(metadata.units.get(name)):
             gap[k] = np.remainder(gap[k] + np.pi, 2 * np.pi) - np.pi
     for group in metadata.unit_groups:
         indices = [metadata.q.index(n) for n in group]

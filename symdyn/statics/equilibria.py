@@ -18,7 +18,7 @@ from symdyn.statics.equilibrium import Equilibrium, begin, find, settled, steps
 from symdyn.statics.manifold import natural_length
 from symdyn.statics.selection import Selection, listed, select
 from symdyn.statics.terms import OperatingPoint, coordinate_names
-from symdyn.turning import turns
+from symdyn.turning import in_radians, turns
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -140,7 +140,7 @@ def same(a: Equilibrium, b: Equilibrium) -> bool:
         there[indices] = False
         if min(np.abs(a.q[indices] - b.q[indices]).max(), np.abs(a.q[indices] + b.q[indices]).max()) > APART:
             return False
-    gap = np.array([_turned(g) if metadata.units.get(n) == "rad" else g for g, n in zip(gap, names, strict=True)])
+    gap = np.array([_turned(g) if in_radians(metadata.units.get(n)) else g for g, n in zip(gap, names, strict=True)])
     more = [a.z - b.z, [a[n] - b[n] for n in a.selection.unknown]]
     sizes = [*a.z, *[a[n] for n in a.selection.unknown]]
     return bool((np.abs(gap[there]) <= APART).all()

@@ -10,6 +10,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.statics.terms import OperatingPoint
+from symdyn.turning import in_radians
 
 REMEDY = ("use Euler parameters (orientation='parameters' of a catalogued system, orientation=EulerParameters() of a joint), or "
           "another order of the angles")
@@ -22,7 +23,7 @@ TURN = 0.4
 def lock(point: OperatingPoint) -> str:
     """The coordinate whose value brings gimbal lock, as "theta = 90 deg"; "" where there is none."""
     metadata = point.module.metadata
-    angles = [k for k, n in enumerate(metadata.q) if metadata.units.get(n) == "rad"]
+    angles = [k for k, n in enumerate(metadata.q) if in_radians(metadata.units.get(n))]
     if not angles:
         return ""
     here = independence(point)

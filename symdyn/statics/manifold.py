@@ -39,8 +39,8 @@ UNIT_ROW = 1e-13
 DUST = 16 * float(np.finfo(float).eps)
 # Dependent changes may be this many times the independent ones where a choice is to serve along a motion.
 SERVES = 30.0
-# Masses below this part of the largest are none.
-MASSLESS = 1e-6
+# Masses below this part of the largest do not count as inertia in sizes of accelerations and directions.
+NEGLIGIBLE_MASS = 1e-6
 # Changes of inputs that leave more than this part of what they change of the constraints are not followed.
 FOLLOWED = 1e-8
 # Independent velocities that determine the others worse than by this condition are rejected.
@@ -448,7 +448,7 @@ def natural_length(point: OperatingPoint) -> float:
 def acceleration_size(point: OperatingPoint, forces: np.ndarray) -> float:
     """The largest acceleration that forces make of what has mass, in natural units of displacements, 1/s^2."""
     masses = np.abs(np.diag(point.M))
-    heavy = masses > MASSLESS * masses.max(initial=0.0)
+    heavy = masses > NEGLIGIBLE_MASS * masses.max(initial=0.0)
     return float((forces[heavy] / masses[heavy] / natural_scales(point)[heavy]).max(initial=0.0))
 
 
@@ -470,7 +470,7 @@ def in_motion(point: OperatingPoint, selection: Selection) -> OperatingPoint:
             rows.append(np.eye(n_u)[[metadata.u.index(name)]])
             right.append(np.zeros(1))
     masses = np.abs(np.diag(point.M))
-    scale = 1 / np.sqrt(np.maximum(masses, MASSLESS * masses.max(initial=1e-300)))
+    scale = 1 / np.sqrt(np.maximum(masses, NEGLIGIBLE_MASS * masses.max(initial=1e-300)))
     A = np.vstack(rows) * scale
     KKT = np.block([[point.M * np.outer(scale, scale), A.T], [A, np.zeros((len(A), len(A)))]])
     result = np.linalg.lstsq(KKT, np.concatenate([-point.forces * scale, *right]), rcond=1e-12)[0]

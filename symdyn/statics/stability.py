@@ -27,6 +27,7 @@ from symdyn.statics.singular import singular_configuration
 from symdyn.statics.spectrum import CONTINUOUS, Spectrum, spectrum
 from symdyn.statics.steady import accelerating, depends_on_time, fastest, steadiness
 from symdyn.statics.terms import coordinate_names
+from symdyn.turning import in_radians
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -327,7 +328,7 @@ def found_period(manifold: Manifold) -> float | None:
     metadata = point.module.metadata
     labels = coordinate_names(metadata)
     turning = {name: abs(float(u)) for u, name, label in zip(point.u, metadata.u, labels, strict=True)
-               if u and metadata.units.get(label, metadata.units.get(name)) in ("rad", "rad/s")}
+               if u and in_radians(metadata.units.get(label, metadata.units.get(name, "")).removesuffix("/s"))}
     held = [speed for (name, speed), label in ((each, labels[metadata.u.index(each[0])]) for each in turning.items())
             if name in manifold.selection.held or label in manifold.selection.held]
     if held:

@@ -15,6 +15,7 @@ from symdyn.runtime.integrating.outcome import Outcome
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.shown import shown
 from symdyn.statics.modes import Mode
+from symdyn.turning import in_radians
 
 if TYPE_CHECKING:
     from symdyn.statics.linearize import Linearization
@@ -92,7 +93,7 @@ def _visible(linear: Linearization, shape: np.ndarray) -> float:
     largest = float(moved.max(initial=0.0))
     if not (extent > 0 and largest > 1e-9 * extent):
         return _TURNED
-    turns = module.metadata.units.get(_leading(linear, shape)) == "rad"
+    turns = in_radians(module.metadata.units.get(_leading(linear, shape)))
     return min(_SEEN * extent / largest, _TURNED if turns else np.inf)
 
 

@@ -33,6 +33,7 @@ from symdyn.stress.reference import (
 )
 from symdyn.stress.statements import Statements, emitted
 from symdyn.stress.system_under_test import EPS, SystemUnderTest, evaluated
+from symdyn.turning import in_radians
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
@@ -191,7 +192,7 @@ def _resolved(tested: SystemUnderTest, x: np.ndarray) -> np.ndarray:
 def _angles(tested: SystemUnderTest) -> list[int]:
     """Places of the coordinates that are angles."""
     units, symbols = tested.module.metadata.units, tested.symbols
-    return [k for k, s in enumerate(symbols.coordinates) if units.get(s.name) == "rad" and s not in symbols.reach]
+    return [k for k, s in enumerate(symbols.coordinates) if in_radians(units.get(s.name)) and s not in symbols.reach]
 
 
 class Measured:

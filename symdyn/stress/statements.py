@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from symdyn.backend.program import SINGULAR_FALLBACK
 from symdyn.functions.tapes import tape_as_derived
 from symdyn.stress.system_under_test import SystemUnderTest
 from symdyn.tape.balance import balance
@@ -34,10 +35,11 @@ def emitted(tested: SystemUnderTest, names: Sequence[str]) -> dict[str, list[Sta
         for name in names:
             there = tape_as_derived(others, name)
             if _entries(there) != _entries(tapes[name]):
-                tapes[f"{name} otherwise"] = there
+                tapes[f"{name}_{SINGULAR_FALLBACK}"] = there
     recorder = next(iter(tapes.values())).recorder
     whole = balance(Tape(recorder, {name: next(iter(tape.outputs.values())) for name, tape in tapes.items()}))
-    return {name: [written_out(whole.prune((key,))) for key in (name, f"{name} otherwise") if key in tapes] for name in names}
+    return {name: [written_out(whole.prune((key,))) for key in (name, f"{name}_{SINGULAR_FALLBACK}") if key in tapes]
+            for name in names}
 
 
 def _entries(tape: Tape) -> list[tuple[Any, ...]]:

@@ -21,6 +21,7 @@ from symdyn.pictures.looks import Mechanism, not_drawn_by_rules, ropes_of, with_
 from symdyn.pictures.mechanism import filled, touched
 from symdyn.pictures.symbols import typeset_unit
 from symdyn.tape.floats import evaluate_rows
+from symdyn.turning import in_radians
 from symdyn.viewer.page import View, page_of
 from symdyn.viewer.scene import scene_of
 
@@ -171,13 +172,13 @@ def _sliders(equations: Equations, values: dict[str, float], names: Sequence[str
     result = []
     for k, c in enumerate(s.coordinates):
         value = 0.0 if k in unit else values[c.name]
-        reach = 1.0 if k in unit else s.reach.get(c) or (math.pi if s.units.get(c) == "rad" else 0.6 * length)
+        reach = 1.0 if k in unit else s.reach.get(c) or (math.pi if in_radians(s.units.get(c)) else 0.6 * length)
         result.append(_slider("q", k, c.name, s.units.get(c, ""), values[c.name], value - reach, value + reach))
     for group, symbols in (("p", s.parameters), ("inputs", s.inputs)):
         for k, p in enumerate(symbols):
             value = values[p.name]
             ends = ((0.1 * value, 2.5 * value) if group == "p" and value else
-                    (value - math.pi, value + math.pi) if s.units.get(p) == "rad" else (value - length, value + length))
+                    (value - math.pi, value + math.pi) if in_radians(s.units.get(p)) else (value - length, value + length))
             result.append(_slider(group, k, p.name, s.units.get(p, ""), value, min(ends), max(ends),
                                   p.name in used and p.name not in fixed))
     waves = any("waves" in record["values"] for record in equations.drawn)
