@@ -110,11 +110,11 @@ class Columns:
 
     def _needs(self, k: int) -> dict[Node, int]:
         """The steps of the derivatives along a direction in group k that depend on it, each with its entries, as bits."""
-        places = {name: 1 << column for column, name in enumerate(self.groups[k].seeds)}
+        bit = {name: 1 << column for column, name in enumerate(self.groups[k].seeds)}
         needs: dict[Node, int] = {}
         for node in reachable(self.entries(k)):
             if node.mask & SEED:
-                needs[node] = places[node.args[1]] if node.op == "leaf" else _together(needs, node)
+                needs[node] = bit[node.args[1]] if node.op == "leaf" else _together(needs, node)
         return needs
 
     def _moving(self) -> list[Node]:

@@ -144,8 +144,8 @@ class ContactRecord(NamedTuple):
 
 
 class GroupRecord(NamedTuple):
-    """A group of contacts whose pairs are found along a motion: its bodies, places of their speeds in u body after body, how many
-    planes it has."""
+    """A group of contacts whose pairs are found along a motion: its bodies, indices of their speeds in u by bodies, number of
+    its planes."""
 
     name: str
     bodies: tuple[str, ...]

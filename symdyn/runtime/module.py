@@ -561,8 +561,8 @@ class Module:
         return result if result is not None else np.zeros(self.shape(name), dtype=bool)
 
     def jacobian_indices(self) -> Places | None:
-        """Where `jacobian_x` may differ from zero, as places of rows and columns; None where that is unknown, as where the module
-        was put together without equations.
+        """Where `jacobian_x` may differ from zero, as indices of rows and columns; None where that is unknown, such as for a
+        module without equations.
 
         >>> sd.systems.pendulum().compile(backend="numpy").jacobian_indices().columns
         array([1, 0])

@@ -351,9 +351,9 @@ static void symdyn_cones_combine(
 static void symdyn_cones_sweeps(symdyn_cones *c, double tolerance, long most) {
     const long rows = c->first[c->n], room = 3 * c->most;
     double G[SYMDYN_CONES_DEPTH][SYMDYN_CONES_DEPTH], lengths[SYMDYN_CONES_DEPTH], least = 0.0;
-    int known = 0, place = 0;
+    int known = 0, index = 0;
     for (long k = 0; k < most; k++) {
-        double *changed = c->history + place * room, *swept = c->history + (SYMDYN_CONES_DEPTH + place) * room, size = 0.0;
+        double *changed = c->history + index * room, *swept = c->history + (SYMDYN_CONES_DEPTH + index) * room, size = 0.0;
         for (long r = 0; r < rows; r++) c->before[r] = c->P[r];
         if (symdyn_cones_sweep(c) <= tolerance) return;
         for (long r = 0; r < rows; r++) {
@@ -365,15 +365,15 @@ static void symdyn_cones_sweeps(symdyn_cones *c, double tolerance, long most) {
             c->kept[r] = c->P[r];
         }
         if (!k || size > 4.0 * least) {  // no history, or one that misleads
-            known = place = 0;
+            known = index = 0;
             least = size;
             continue;
         }
         least = fmin(least, size);
-        lengths[place] = symdyn_cones_dot(swept, swept, rows);
+        lengths[index] = symdyn_cones_dot(swept, swept, rows);
         known = known < SYMDYN_CONES_DEPTH ? known + 1 : known;
-        for (int j = 0; j < known; j++) G[place][j] = G[j][place] = symdyn_cones_dot(changed, c->history + j * room, rows);
-        place = (place + 1) % SYMDYN_CONES_DEPTH;
+        for (int j = 0; j < known; j++) G[index][j] = G[j][index] = symdyn_cones_dot(changed, c->history + j * room, rows);
+        index = (index + 1) % SYMDYN_CONES_DEPTH;
         symdyn_cones_combine(c, G, lengths, known);
     }
 }

@@ -111,15 +111,14 @@ static int symdyn_event_rounding(symdyn_run *run, double t, const double *x, dou
     if (failure || (failure = symdyn_inputs_at(&run->problem, t, x, inputs))) return failure;
 #endif
     for (int l = 0; l < SYMDYN_LEAVES; l++) {
-        const int place = symdyn_event_leaf[l];
+        const int leaf = symdyn_event_leaf[l];
 #if SYMDYN_BOUNDED_INPUTS
-        const double at = place == 0 ? t : place > SYMDYN_NX ? inputs[place - (SYMDYN_NX + 1)] : x[place - 1];
+        const double at = leaf == 0 ? t : leaf > SYMDYN_NX ? inputs[leaf - (SYMDYN_NX + 1)] : x[leaf - 1];
 #else
-        const double at = place == 0 ? t : x[place - 1];
+        const double at = leaf == 0 ? t : x[leaf - 1];
 #endif
-        const double size =
-            place == 0 || place > SYMDYN_NX ? fabs(at) : fmax(fabs(run->x_old[place - 1]), fabs(run->x[place - 1]));
-        const double radius = symdyn_eps * (place == 0 ? 2.0 : SYMDYN_PANEL_DENSE) * size;
+        const double size = leaf == 0 || leaf > SYMDYN_NX ? fabs(at) : fmax(fabs(run->x_old[leaf - 1]), fabs(run->x[leaf - 1]));
+        const double radius = symdyn_eps * (leaf == 0 ? 2.0 : SYMDYN_PANEL_DENSE) * size;
         ud[6 * l] = at - radius;
         ud[6 * l + 1] = at + radius;
     }
@@ -171,13 +170,13 @@ static int symdyn_event_leaves(
     (void)right;
 #endif
     for (int l = 0; l < SYMDYN_LEAVES; l++) {
-        const int place = symdyn_event_leaf[l];
-        if (place == 0) continue;
+        const int leaf = symdyn_event_leaf[l];
+        if (leaf == 0) continue;
         for (int j = 0; j < SYMDYN_PANEL + 1; j++)
 #if SYMDYN_BOUNDED_INPUTS
-            w[l][j] = place > SYMDYN_NX ? inputs[j][place - (SYMDYN_NX + 1)] : states[j][place - 1];
+            w[l][j] = leaf > SYMDYN_NX ? inputs[j][leaf - (SYMDYN_NX + 1)] : states[j][leaf - 1];
 #else
-            w[l][j] = states[j][place - 1];
+            w[l][j] = states[j][leaf - 1];
 #endif
     }
     return 0;
@@ -634,19 +633,19 @@ __attribute__((noinline)) static int symdyn_event_widened(symdyn_run *run, const
 
 // The range of a leaf throughout the latest step, no further than twice as far as by the slopes of stages.
 static inline void symdyn_event_range(const symdyn_run *run, int l, double *range) {
-    const int place = symdyn_event_leaf[l];
+    const int leaf = symdyn_event_leaf[l];
     double least = 0.0, most = 0.0;
-    if (!place) {
+    if (!leaf) {
         range[0] = run->direction > 0.0 ? run->t_old : run->t;
         range[1] = run->direction > 0.0 ? run->t : run->t_old;
         return;
     }
     for (int j = 0; j <= 4; j++) {
-        const double slope = j < 4 ? run->method.k[j * SYMDYN_STAGES / 4][place - 1] : run->xd[place - 1];
+        const double slope = j < 4 ? run->method.k[j * SYMDYN_STAGES / 4][leaf - 1] : run->xd[leaf - 1];
         least = slope < least ? slope : least;
         most = slope > most ? slope : most;
     }
-    const double from = 2.0 * run->h_old * least, to = 2.0 * run->h_old * most, x = run->x_old[place - 1];
+    const double from = 2.0 * run->h_old * least, to = 2.0 * run->h_old * most, x = run->x_old[leaf - 1];
     range[0] = x + (from < to ? from : to);
     range[1] = x + (from < to ? to : from);
 }
