@@ -28,15 +28,19 @@ def own_fields(node: ast.ClassDef) -> Iterator[str]:
             yield inner.name
 
 
-def fields(node: ast.ClassDef, classes: Mapping[str, ast.ClassDef]) -> set[str]:
-    """With those of the classes of the package that it derives from."""
+def fields(node: ast.ClassDef, classes: Mapping[str, list[ast.ClassDef]]) -> set[str]:
+    """With those of the classes of the package with the names of its bases."""
     bases = {base.id for base in node.bases if isinstance(base, ast.Name)} & set(classes) - {node.name}
-    return set(own_fields(node)).union(*(fields(classes[base], classes) for base in bases))
+    return set(own_fields(node)).union(*(fields(each, classes) for base in bases for each in classes[base]))
 
 
 def stale(trees: Mapping[str, ast.Module]) -> list[str]:
     """Names in lists of docstrings that the class or function lacks. A list with none of its names is about something else."""
-    classes = {node.name: node for tree in trees.values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+    classes: dict[str, list[ast.ClassDef]] = {}
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                classes.setdefault(node.name, []).append(node)
     result = []
     for path, tree in trees.items():
         for node in ast.walk(tree):

@@ -391,7 +391,7 @@ def test_a_sweep_on_gpus_is_submitted_where_there_is_none(tmp_path, capsys, queu
 
 @pytest.mark.skipif(shutil.which("nvidia-smi") is not None, reason="there may be a GPU")
 @pytest.mark.parametrize("path", [None, "new"])
-def test_a_machine_without_a_gpu_says_so_before_anything_is_written(tmp_path, path):
+def test_a_machine_without_a_gpu_reports_it_before_anything_is_written(tmp_path, path):
     asked = {} if path is None else {"path": tmp_path / path}
     with pytest.raises(sd.ArgumentError, match="device='gpu:1' was asked for, but this machine has no CUDA device that answers"):
         sd.ensemble(recall("double_pendulum", {}), {"q1": [0.1, 0.2]}, (0, 0.1), device="gpu:1", **asked)

@@ -220,7 +220,7 @@ def test_memory_grows_with_the_number_of_states() -> None:
 
 @needs_c
 def test_a_long_cable_runs_where_dense_matrices_do_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bound counts what is taken: the band's matrices pass, dense ones do not, and smaller bounds refuse bands."""
+    """The bound counts what is taken: the band's matrices pass, dense ones do not, and smaller bounds reject bands."""
     module = elastic_cable(100).embedding().compile(backend="c")
     band = 8 * (396 // 2 * 10 * 4 + len(module.jacobian_indices().rows))
     monkeypatch.setattr(methods, "LARGEST_MATRICES", band)

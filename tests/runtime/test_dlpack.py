@@ -98,7 +98,7 @@ def test_results_are_taken_where_they_are(arm: Any) -> None:
 
 
 def test_jax(arm: Any, addresses: list[int]) -> None:
-    """Its arrays are in doubles where it was told so."""
+    """Its arrays are in doubles where that was requested."""
     jax = pytest.importorskip("jax")
     x = states()
     here = arm.simulate_batch(x[:, :2], x[:, 2:], parameters(arm), t=(0, 1), sensitivities=["m2"])
