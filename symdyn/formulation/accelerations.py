@@ -31,7 +31,7 @@ class Solver(Protocol):
 
 
 class Motion:
-    """What every formulation in independent speeds shares.
+    """Common part of all formulations in independent speeds.
 
     A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`; one that needs no mass matrix for the
     accelerations has its own `solver` and `accelerations`.
@@ -94,7 +94,7 @@ class Motion:
             self._memory = kept
 
     def reasons(self) -> list[str]:
-        """What it means, speed by speed, if a pivot of the mass matrix is not positive."""
+        """Reasons, speed by speed, for a pivot of the mass matrix that is not positive."""
         return [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
 
     def sizes_of_pivots(self) -> Mapping[int, Any]:
@@ -169,7 +169,7 @@ class Motion:
             return np.vstack([top, middle, bottom])
 
     def unknowns(self) -> np.ndarray:
-        """What the equations are solved for: accelerations, and with constraints multipliers."""
+        """Unknowns of the equations: accelerations, and with constraints multipliers."""
         return self.recall("accelerations")  # type: ignore[no-any-return]
 
     def groups(self) -> dict[str, list[Any]]:

@@ -24,14 +24,14 @@ from symdyn.tape.tape import reachable, unsigned
 BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
 # By what a weighted sum of the rates is differentiated, once or twice.
 WEIGHTED = ("x", "inputs", "params", "t")
-# What else is weighted and differentiated twice.
+# Other quantities that are weighted and differentiated twice.
 CURVED = ("constraints", "outputs")
 # The quantity whose entries the equations are solved for.
 UNKNOWNS = "unknowns"
 
 
 def derivative_named(name: str) -> tuple[str, str] | None:
-    """What a function of this name differentiates, and by what; None for other functions."""
+    """The quantity that a function of this name differentiates, and the variables; None for other functions."""
     of, _, by = name.rpartition("_by_")
     return (of, by) if of and by in BY else None
 

@@ -1,4 +1,4 @@
-"""What every formulation gives: quantities by name, recorded when asked for, printed by expanding their tape."""
+"""Results of every formulation: quantities by name, recorded when asked for, printed by expanding their tape."""
 
 from __future__ import annotations
 

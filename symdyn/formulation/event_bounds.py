@@ -58,7 +58,7 @@ def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
 
 
 def event_leaves(equations: Equations) -> list[int]:
-    """What the events that can be enclosed depend on: 0 for t, then the entries of x = [q; u; z], then the inputs."""
+    """Arguments of the events that can be enclosed: 0 for t, then the entries of x = [q; u; z], then the inputs."""
     places = {name: k for k, name in enumerate(_leaf_names(equations))}
     ways = [equations] if equations.singular_fallback is None else [equations, equations.singular_fallback]
     values = [entry for way in ways for entry in _values(way, enclosed(equations))]
@@ -66,7 +66,7 @@ def event_leaves(equations: Equations) -> list[int]:
 
 
 def bound_names(leaves: Sequence[int]) -> list[str]:
-    """What stands in the group ud of the function."""
+    """Entries of the group ud of the function."""
     return [f"({end} {k})" for k in leaves for end in _ENDS]
 
 

@@ -1,4 +1,4 @@
-"""What statics and linearization need of the equations: their balance at given accelerations, and exact derivatives of it.
+"""Quantities for statics and linearization: their balance at given accelerations, and exact derivatives of it.
 
 balance   [M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot; C_dot; C_ddot; q_dot; q_ddot],
           (n_u + n_c + n_z + 2 n_c + 2 n_q,); C is 0 in the rows of velocity constraints. At rest all of it is zero; along any

@@ -1,4 +1,4 @@
-"""What sensitivities of a motion are integrated with: derivatives along a direction of what a run evaluates.
+"""Quantities from which sensitivities of a motion are integrated: derivatives along a direction of what a run evaluates.
 
 The direction is an argument, the leaves of `direction`: changes of [q; u; z; inputs; parameters]. What takes the place of these
 leaves (see symdyn.functions.sensitivities) decides how many columns there are, and of which sensitivities.

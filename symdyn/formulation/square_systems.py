@@ -43,7 +43,7 @@ class SquareSystem:
         return x
 
     def _inverse(self, rows: list[int], columns: list[int]) -> np.ndarray | None:
-        """Of a block by determinants; None if it is too large for that."""
+        """Inverse of a block by determinants; None if it is too large for that."""
         block = self.A[np.ix_(rows, columns)]
         n = len(rows)
         if n > LARGEST:

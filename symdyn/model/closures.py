@@ -1,4 +1,4 @@
-"""What closes loops besides joints: a rod between two points, a gear between two joints; and constraints by expression."""
+"""Closures of loops in addition to joints: a rod between two points, a gear between two joints; and constraints by expression."""
 
 from __future__ import annotations
 

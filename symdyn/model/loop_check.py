@@ -57,7 +57,7 @@ def carried(joint: Joint) -> tuple[Body, Joint, Joint]:
 
 def loop_faults(loops: Iterable[Joint | Gear], joints: Mapping[str, Joint],
                 resolve: Callable[[Any, str], int | None]) -> list[str]:
-    """What is wrong with the loops; resolve(body, where) gives a body's number and reports unknown ones itself."""
+    """Faults of the loops; resolve(body, where) gives a body's number and reports unknown ones itself."""
     faults = [f"rod {shown(j.name)} cannot carry a body in the tree; join the bodies by other joints and pass the rod to "
               "close_loop"
               for j in joints.values() if isinstance(j, Rod)]
@@ -114,7 +114,7 @@ def _gear_faults(gear: Gear, joints: Mapping[str, Joint]) -> list[str]:
 
 def constraint_faults(constraints: Iterable[Constraint], moving: Iterable[sp.Symbol], states: Iterable[sp.Symbol],
                       speeds: Iterable[sp.Symbol]) -> list[str]:
-    """What is wrong with constraints by expression; moving: coordinates, their rates, speeds."""
+    """Faults of constraints by expression; moving: coordinates, their rates, speeds."""
     faults = []
     moving, states, rates = set(moving), set(states), set(speeds)
     for c in constraints:

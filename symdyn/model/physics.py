@@ -46,7 +46,7 @@ def inertia_faults(body: Body, planar: bool) -> tuple[list[str], list[str]]:
 
 
 def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
-    """What turns or moves out of the x-y plane in a planar system."""
+    """Parts that turn or move out of the x-y plane in a planar system."""
     faults: list[str] = []
     for joint in joints:
         where = f"joint {shown(joint.name)}"

@@ -28,9 +28,9 @@ OMEGA = r"\omega"
 
 @dataclass(frozen=True)
 class Measure:
-    """What a Quantity is: its kind, the names of its bodies (or of its joint, or constraint), points on them, body axes, the
-    component, how often it is differentiated by time, the body in whose axes components of a reaction are taken, and the unit
-    of the force of a contact."""
+    """Definition of a quantity: kind, the names of its bodies (or of its joint, or constraint), points on them, body axes, the
+    component, how often it is differentiated by time, the body in whose axes components of a reaction are taken, and the
+    unit of the force of a contact."""
 
     kind: str
     of: tuple[str, ...]
@@ -67,7 +67,7 @@ class Quantity(Timed):
 
     @property
     def level(self) -> int:
-        """What it takes: 0 coordinates, 1 speeds, too, 2 accelerations or forces, too."""
+        """Highest level of its arguments: 0 coordinates, 1 speeds, too, 2 accelerations or forces, too."""
         kind, order = self.measure.kind, self.measure.order
         return 2 if kind in ("multiplier", "reaction", "contact") else order + (kind == "angular_velocity")
 

@@ -1,4 +1,4 @@
-"""What pictures show of the surroundings of bodies: what contacts touch, and how mooring lines hang.
+"""Surroundings of bodies in pictures: what contacts touch, and how mooring lines hang.
 
 It has no part in the equations. Curves and surfaces are texts in x, y and p1, p2, ..., which stand for parameters, or the numbers
 of splines.
@@ -26,12 +26,12 @@ from symdyn.tape.external import Result
 if TYPE_CHECKING:
     from symdyn.model.system import System
 
-# What heights and radii are written in.
+# Variables of heights and radii.
 ABSCISSAE = ("x", "y")
 
 
 def surroundings_of(system: System, loads: Iterable[Any], parameters: Iterable[sp.Symbol]) -> tuple[Drawn, ...]:
-    """What the contacts and mooring lines of a checked system show; what follows from other symbols than parameters is left
+    """Surroundings by the contacts and mooring lines of a checked system; what follows from other symbols than parameters is left
     out."""
     known = set(parameters)
     result = [*_counterparts(system), *(_line(load) for load in loads if isinstance(load, MooringLine))]
@@ -39,7 +39,7 @@ def surroundings_of(system: System, loads: Iterable[Any], parameters: Iterable[s
 
 
 def _counterparts(system: System) -> Iterator[Drawn]:
-    """What bodies touch: shapes on body b of each contact; on a ground that moves they are left out."""
+    """Shapes that bodies touch: those on body b of each contact; on a ground that moves they are left out."""
     fixed = system.ground_motion is None
     for contact in system.contacts:
         if isinstance(contact, Contact) and (fixed or name_of(contact.b) != "ground"):

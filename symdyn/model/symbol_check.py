@@ -171,7 +171,7 @@ def _no_position(symbol: sp.Symbol) -> bool:
 
 
 def _quantity_faults(quantity: Quantity, where: str, scope: Scope, planar: bool) -> list[str]:
-    """What is wrong with a quantity in an expression of some scope."""
+    """Fault of a quantity in an expression of some scope."""
     measure, faults = quantity.measure, []
     if scope == Scope.PARAMETERS:
         faults.append(f"{where} depends on {quantity}, but must be constant; use parameters and numbers")

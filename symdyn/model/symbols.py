@@ -290,7 +290,7 @@ def symbols_of(expression: Any) -> set[Any]:
 
 
 def described(symbol: sp.Symbol) -> str:
-    """What a symbol is and with which assumptions it was made, to keep apart those of one name in messages."""
+    """Kind of a symbol with its assumptions, which distinguish symbols of one name in messages."""
     kinds = {Coordinate: "a coordinate", Speed: "a speed", Input: "an input", GivenMotion: "a motion",
              GivenRate: "the rate of a motion", GivenAcceleration: "the acceleration of a motion",
              Rate: "the derivative of a coordinate or speed", Acceleration: "a second derivative"}

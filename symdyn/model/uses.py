@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Scope(IntEnum):
-    """What may occur in an expression; each adds to those before it."""
+    """Quantities that may occur in an expression; each adds to those before it."""
 
     PARAMETERS = 0
     COORDINATES = 1  # and t

@@ -35,7 +35,7 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
 from symdyn.tape.walk import walk
 
-# Of doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
+# For doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
 TINY, CLOSE = 9e-16, 1e-8
 NEAREST = SYMDYN_NEAREST
 # Friction below this is none, so that nothing is divided by zero.
@@ -114,7 +114,7 @@ def _tensions(recorder: Recorder, seabed: bool, h: Any, v: Any) -> tuple[Any, An
 
 @functools.cache
 def _linearized(seabed: bool, rough: bool) -> tuple[list[Node], list[Node], list[Any]]:
-    """What the changes of h and v are made of (h, v, the four values and their changes), the steps, and the changes.
+    """Terms of the changes of h and v (h, v, the four values and their changes), the steps, and the changes.
 
     By the implicit function theorem; rough: there is friction.
     """

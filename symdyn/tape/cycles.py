@@ -44,7 +44,7 @@ def fused_products(tape: Tape) -> set[Node]:
 
 @dataclass(frozen=True)
 class Schedule:
-    """What an evaluation takes after hoisting, sines and cosines left out.
+    """Cost of an evaluation after hoisting, sines and cosines left out.
 
     instructions   operations, a product and the sum that takes it counted once
     cycles         from when sines and cosines are known

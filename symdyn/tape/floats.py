@@ -26,7 +26,7 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
 
 @dataclass(frozen=True)
 class Entries:
-    """Of an output of a tape the entries that are not zero by structure: places (e,) in it, ascending, row by row, and values
+    """Entries of an output of a tape that are not zero by structure: indices (e,) in it, ascending, row by row, and values
     (n, e) at n points."""
 
     shape: tuple[int, ...]
@@ -61,7 +61,7 @@ def evaluate_entries(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str,
 
 
 class Slopes:
-    """What the table of operations asks of a recorder for derivatives, on arrays."""
+    """Operations on arrays that the table of operations needs for derivatives."""
 
     @staticmethod
     def apply(op: str, *args: Any) -> Any:

@@ -23,7 +23,7 @@ from symdyn.tape.walk import Arithmetic, walk
 BIG, LARGEST_EXPONENT = 10**60, 138
 # Values with more operations than this that move are not enclosed: intervals grow with every one of them.
 MOST = 400
-# What an operation with rounding changes its value by, in parts of it: a unit of the last place of doubles.
+# Relative change of a value by an operation with rounding: a unit of the last place of doubles.
 ROUNDING = Fraction(1, 2**52)
 _COMPARED = {"lt", "le", "gt", "ge", "eq", "ne"}
 # Operations without rounding.
@@ -177,7 +177,7 @@ class _Intervals(Arithmetic):
         return Interval(self.r.apply(op, a.lo), self.r.apply(op, a.hi))
 
     def cosine(self, a: Interval, shift: Any) -> Interval:
-        """Of cos(z - shift pi): its extremes within, else its ends."""
+        """Range of cos(z - shift pi): by its extremes within, else by its ends."""
         r = self.r
         function = "sin" if shift else "cos"
         turns = [r.div(r.div(end, 2), r.apply("pi")) for end in a]

@@ -37,14 +37,14 @@ DAMPED = 1e-3
 LOOSE = 1e-14
 EPS = 2.0**-52
 MASSLESS, ROUNDS, CLEANINGS = SYMDYN_MASSLESS, SYMDYN_ROUNDS, SYMDYN_CLEANINGS
-# What the algorithms need of NumPy's names.
+# Names of NumPy that the algorithms use.
 _NAMES = (
     "subtract", "divide", "greater", "less_equal", "not_equal", "maximum", "logical_or", "where")
 
 
 @dataclass(frozen=True)
 class Intrinsic:
-    """Of one size. Subclasses say what is computed.
+    """A numeric algorithm of one size. Subclasses say what is computed.
 
     name     in generated code; sizes: what it is called with
     reason   what it means if it fails

@@ -59,7 +59,7 @@ def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
 
 
 def breaks(recorder: Recorder, entries: Sequence[Any]) -> list[Any]:
-    """What passes zero along a motion where these entries have a kink or a jump, each surface once."""
+    """Expressions that pass zero along a motion where these entries have a kink or a jump, each surface once."""
     result: dict[Any, None] = {}
     for node in reachable(entries):
         if node.mask & _MOVING and node.op in _BENT:
@@ -87,7 +87,7 @@ def _factors(value: Any) -> list[Node]:
 
 
 def description(jump: Jump, symbols: Any) -> dict[str, str]:
-    """What jumps, its surface, the remedy, and where it stands, as text; symbols: leaf -> the user's symbol."""
+    """The jump, its surface, the remedy, and where it stands, as text; symbols: leaf -> the user's symbol."""
     surface = _text(jump.surface, symbols)
     what = "a condition" if jump.node.op in _COMPARED else jump.node.op
     if surface:

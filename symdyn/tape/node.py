@@ -11,7 +11,7 @@ from symdyn.shown import shown
 if TYPE_CHECKING:
     from symdyn.tape.recorder import Recorder
 
-# What a value depends on, as bits; a node's mask is the union over its arguments.
+# Dependencies of a value, as bits; a node's mask is the union over its arguments.
 PARAMETER, TIME, COORDINATE, SPEED, STATE, INPUT, ACCELERATION, SEED = (1 << k for k in range(8))
 
 

@@ -21,7 +21,7 @@ from symdyn.tape.tape import Tape
 from symdyn.tape.walk import Arithmetic, walk
 
 _NAN = arb(math.nan)
-# What FLINT computes, without the radii of its balls; all else is left to mpmath.
+# Operations that FLINT computes, without the radii of its balls; all others are left to mpmath.
 _FLINT: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: (a + b).mid(), "sub": lambda a, b: (a - b).mid(), "mul": lambda a, b: (a * b).mid(),
     "div": lambda a, b: (a / b).mid(), "neg": operator.neg, "sqrt": lambda a: a.sqrt().mid(),

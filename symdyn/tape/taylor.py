@@ -161,7 +161,7 @@ class _Recurrences:
         return self._function(node)
 
     def _multiple(self, node: Node) -> Any:
-        """Of a constant times a constant times what varies: one product, by what is computed once."""
+        """A constant times a constant times a variable: one product, by what is computed once."""
         factor, varying = _varying(node)
         return self.at(factor) * self.of(varying)
 

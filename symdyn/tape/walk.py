@@ -9,7 +9,7 @@ from symdyn.tape.node import Node
 
 
 class Arithmetic:
-    """What values are and how steps make them; subclasses define it.
+    """Kind of values, and how steps make them; subclasses define it.
 
     Those of the package: numbers of mpmath (symdyn.tape.evaluate), arrays of doubles (symdyn.tape.floats), intervals
     (symdyn.tape.intervals), nodes of another tape (symdyn.tape.passes), SymPy (symdyn.tape.sympy_bridge), exact polynomials

@@ -126,7 +126,7 @@ def _taken(given: ByHand, rows: Any, labels: Sequence[str]) -> tuple[list[Constr
 
 @dataclass(frozen=True)
 class _Description:
-    """What was given, checked."""
+    """The arguments, checked."""
 
     name: str
     symbols: Symbols

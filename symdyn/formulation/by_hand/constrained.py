@@ -1,4 +1,4 @@
-"""What constraints add to equations by hand: nothing there distinguishes lengths from angles."""
+"""Constraints of equations by hand: nothing there distinguishes lengths from angles."""
 
 from __future__ import annotations
 

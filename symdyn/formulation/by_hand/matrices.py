@@ -54,7 +54,7 @@ class GivenRow:
 
 @dataclass(frozen=True)
 class GivenMatrices:
-    """What equations consist of, in SymPy's expressions.
+    """Parts of equations, in SymPy's expressions.
 
     symbols      of the equations; same: functions of time and their derivatives -> the symbols (or numbers) that they stand for
     kinematics   K (n_q, n_q), A (n_q, n_u), b (n_q, 1) of K q_dot + A u + b = 0; None: u = q_dot
@@ -223,7 +223,7 @@ class _Matrices(Motion):
         return self.recall("unknowns_of_auxiliary")[k]
 
     def unknowns_of_auxiliary(self) -> np.ndarray:
-        """What makes the auxiliary equations hold at the accelerations of the motion."""
+        """Values by which the auxiliary equations hold at the accelerations of the motion."""
         given, recorder = self.recorded.given, self.algebra.recorder
         assert given.auxiliary is not None
         with self.algebra.section("auxiliary equations"):

@@ -48,7 +48,7 @@ class ConstraintStates:
         self.angular = np.array([turns(symbols.units.get(u)) for u in symbols.speeds], dtype=bool)
 
     def at(self, q: np.ndarray) -> AtStates:
-        """What there is at coordinates (s, n_q)."""
+        """Quantities at coordinates (s, n_q)."""
         entries = evaluate_entries(self.tape, {**self.values, **dict(zip(self.names, q.T, strict=True))}, len(q))
         C, scale, length = (entries[name].dense() for name in ("C", "C_scale", "length"))
         return AtStates(C, scale, length, Sampled.of_entries(entries["C_r"]), Sampled.of_entries(entries["N"]))
@@ -80,7 +80,7 @@ class ConstraintStates:
         return result.C * result.C_scale / result.length[:, None]
 
     def velocities(self, length: Any) -> np.ndarray:
-        """What makes velocities (m/s) of the speeds, (n_u,)."""
+        """Factors that make velocities (m/s) of the speeds, (n_u,)."""
         return np.where(self.angular, length, 1.0)
 
     def moved(self, result: AtStates, y: np.ndarray) -> np.ndarray:

@@ -98,7 +98,7 @@ class Constrained(Motion):
         return [r.remaining for r in self.rows]
 
     def C_scale(self) -> np.ndarray:
-        """What makes every row a length, m; rows of unknown unit are divided by their gradient."""
+        """Factors that make every row a length, m; rows of unknown unit are divided by their gradient."""
         with self.algebra.section("scale of the constraints"):
             return vector(*[self.length / self.length ** POWERS[r.unit] if r.unit in POWERS else self._by_gradient(r)
                             for r in self.rows])
@@ -115,7 +115,7 @@ class Constrained(Motion):
     # -- accelerations and multipliers
 
     def saddle(self) -> SaddleSolver:
-        """What solves M x + C_r^T lam = f, C_r x = d."""
+        """Solver of M x + C_r^T lam = f, C_r x = d."""
         return self._solver(SMOOTHED)
 
     def corrector(self) -> SaddleSolver:

@@ -59,7 +59,7 @@ class NullSpaceSolver:
             self.factors = factorize(algebra, reduced, reasons, "i", dict.fromkeys(sizes, algebra.rounding), sizes)
 
     def _sizes(self, reduced: np.ndarray, massless_pivots: Mapping[int, Collection[int]]) -> dict[int, Any]:
-        """What pivots of the reduced mass matrix are compared with: those of the first independent speed of a motion that may
+        """Reference sizes of pivots of the reduced mass matrix: those of the first independent speed of a motion that may
         have no kinetic energy. Where other speeds of it are dependent, the entry that the pivot comes from may vanish itself."""
         sizes: dict[int, Any] = {}
         for first, others in massless_pivots.items():
@@ -110,7 +110,7 @@ class NullSpaceSolver:
         self.LU = A
 
     def _inverse(self, A: np.ndarray, sizes: Sequence[Any], label: str, index: int) -> np.ndarray:
-        """Of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from, scaled."""
+        """Inverse of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from, scaled."""
         a = self.algebra
         determinant = A[0, 0] if len(A) == 1 else A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
         if isinstance(determinant, Node):

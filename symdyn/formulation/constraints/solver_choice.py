@@ -87,7 +87,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
 
 
 def _remarks(equations: Equations, quantities: Constrained, result: Ranks | None) -> list[str]:
-    """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
+    """Notes about the states and motions that the constraints allow; warns where there seem to be none."""
     symbols = equations.symbols
     used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
     lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
@@ -115,7 +115,7 @@ def _remarks(equations: Equations, quantities: Constrained, result: Ranks | None
 
 
 def operations(quantities: Constrained) -> int:
-    """Of one evaluation of the accelerations."""
+    """Operations of one evaluation of the accelerations."""
     return Tape.of(quantities.algebra.recorder, accelerations=quantities.accelerations()).operations
 
 

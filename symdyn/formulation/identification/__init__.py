@@ -1,1 +1,1 @@
-"""What identification takes: regressors, inertial and base parameters."""
+"""Quantities for identification: regressors, inertial and base parameters."""

@@ -1,4 +1,4 @@
-"""What identification takes: regressors, inertial parameters and base parameters of the equations of a tree."""
+"""Quantities for identification: regressors, inertial parameters and base parameters of the equations of a tree."""
 
 from __future__ import annotations
 

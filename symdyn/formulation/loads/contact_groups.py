@@ -1,4 +1,4 @@
-"""What time stepping takes of groups of spheres that touch one another: where each is, how it moves, and what it weighs.
+"""Quantities for time stepping of groups of spheres that touch one another: where each is, how it moves, and what it weighs.
 
 A body of a group hangs on a joint of its own, so that its speeds answer to impulses on it alone: M^-1 is a small block.
 """

@@ -32,7 +32,7 @@ FAR = Fraction(1, 1000)
 
 
 class ContactRows:
-    """What rigid contacts need at a state, apart from each other's modes.
+    """Quantities of rigid contacts at a state, apart from each other's modes.
 
     leaves          of the forces, in the order of the rows
     accelerations   u_dot as it follows from the leaves, (n_u,); rate: the derivative by time of recorded values at these

@@ -33,7 +33,7 @@ FAR = 0.2
 
 @dataclass
 class Applied:
-    """What acts on a tree: a wrench (f, n about the origin, link axes) for each link, a force for each joint speed.
+    """Loads on a tree: a wrench (f, n about the origin, link axes) for each link, a force for each joint speed.
 
     poses    of the bodies; bodies: the same wrenches body by body, about the origins and in the axes of their links
     """
@@ -179,7 +179,7 @@ class Loads:
 
     @cached_property
     def settled(self) -> Settled:
-        """What solves for the loads that depend on accelerations, multipliers and reactions."""
+        """Solution for the loads that depend on accelerations, multipliers and reactions."""
         assert self._settle is not None
         return self._settle()
 
@@ -190,7 +190,7 @@ class Loads:
     # -- each kind
 
     def _action(self, load: Element) -> Action:
-        """What an element does, recorded once."""
+        """The action of an element, recorded once."""
         if id(load) not in self._actions:
             place = self._place(load.body)
             assert place is not None  # checked with the model: nothing comes of a load on the ground
@@ -252,7 +252,7 @@ class Loads:
                 self._pull(result, load, d * (tension / self.value(load.span)), common)
                 return
             apply = self.algebra.recorder.apply
-            # What pulls only is slack where its ends coincide, and has no direction there.
+            # A load that pulls only is slack where its ends coincide, and has no direction there.
             slack = isinstance(tension, Node) and any(node.op in ("max", "min", "select") for node in reachable([tension]))
             per_length = apply("select", apply("eq", tension, 0), 0, tension / length) if slack else tension / length
             self._pull(result, load, d * per_length, common)

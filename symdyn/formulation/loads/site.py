@@ -25,7 +25,7 @@ ARCSINE = (Fraction(1), Fraction(1, 6), Fraction(3, 40), Fraction(5, 112), Fract
 
 
 class BodySite:
-    """What symdyn.model.elements.Site asks for, of body number k."""
+    """The symdyn.model.elements.Site of body number k."""
 
     def __init__(self, tree: Tree, kinematics: Kinematics, k: int) -> None:
         self.algebra = tree.algebra

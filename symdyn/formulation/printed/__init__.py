@@ -1,1 +1,1 @@
-"""What equations print, and where their entries come from."""
+"""Printed quantities of equations, and where their entries come from."""

@@ -1,4 +1,4 @@
-"""What augmented equations print: C, C_r, C_t, F_d, the full matrix, the right side and the multipliers."""
+"""Printed quantities of augmented equations: C, C_r, C_t, F_d, the full matrix, the right side and the multipliers."""
 
 from __future__ import annotations
 

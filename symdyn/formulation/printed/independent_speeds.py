@@ -1,4 +1,4 @@
-"""What equations in independent speeds print: J, M_tilde, k_tilde, F_tilde and the equations of motion."""
+"""Printed quantities of equations in independent speeds: J, M_tilde, k_tilde, F_tilde and the equations of motion."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ EXPLAINED = {"M_tilde": 2, "k_tilde": 1}
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one body adds to an entry.
+    """Contribution of one body to an entry.
 
     body     its name; for equations from a position map the Cartesian coordinate, "r_1" for the first
     motion   "translational" or "rotational" ("" for Cartesian coordinates, which may be either)
@@ -159,7 +159,7 @@ class OfBodies:
         return parts + self._rest("k_tilde", (i,), parts)
 
     def _rest(self, quantity: str, index: tuple[int, ...], parts: list[Part]) -> list[Part]:
-        """What added mass and the deflection of elastic bodies contribute: all that rigid bodies do not."""
+        """Contributions of added mass and of the deflection of elastic bodies: all that rigid bodies do not."""
         if self.of.tree.rigid:
             return []
         whole = self.of.recall(quantity)[index]

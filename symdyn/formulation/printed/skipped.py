@@ -1,4 +1,4 @@
-"""What a scene does not need and therefore does not get, in sentences: read off the tape, not kept apart from it."""
+"""Parts that a scene does not need and therefore does not get, in sentences: read off the tape, not kept apart from it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def skipped(equations: Equations) -> list[str]:
 
 
 def _constraints(equations: Equations, tape: Tape) -> list[str]:
-    """What the right-hand side does without, of what there is to constraints."""
+    """Parts of constraints that the right-hand side does without."""
     notes = []
     steps = set(tape.steps)
     lam = [e for e in equations.quantity("lam") if isinstance(e, Node)]
@@ -58,7 +58,7 @@ def _constraints(equations: Equations, tape: Tape) -> list[str]:
 
 
 def _mass_matrix(equations: Equations) -> list[str]:
-    """What its structure saves. With constraints it need not be factorized, and they couple what it does not."""
+    """Savings by its structure. With constraints it need not be factorized, and they couple what it does not."""
     M = equations.quantity("M_tilde")
     n = len(M)
     notes = []

@@ -42,7 +42,7 @@ class _Conflict:
 
 
 def contradictions(equations: Equations) -> list[str]:
-    """What is wrong with the constraints at every state, in sentences.
+    """Faults of the constraints at every state, in sentences.
 
     Parameters take their defaults, else random numbers; what shows with some of these numbers only is not reported. Warns
     (ModelWarning) of constraints that contradict each other unless parameters without defaults have certain numbers.

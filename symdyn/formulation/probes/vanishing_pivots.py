@@ -38,7 +38,7 @@ DIGITS, NOTHING = 40, 1e-50
 
 
 def vanishing_pivots(tree: Tree, solid: bool = False) -> dict[int, frozenset[int]]:
-    """Places of the generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds
+    """Indices of the generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds
     after it that may then move what it moves.
 
     solid   only those that then move no link that has a mass at all, and so no constraint between such links; else links have
@@ -248,7 +248,7 @@ def _floats(values: np.ndarray) -> np.ndarray:
 
 
 def _independent(rows: np.ndarray) -> np.ndarray:
-    """What is left of the rows of a matrix, by Gram and Schmidt with all digits; without those that depend on others."""
+    """Remainders of the rows of a matrix, by Gram and Schmidt with all digits; without those that depend on others."""
     basis: list[np.ndarray] = []
     for row in rows:
         rest = row

@@ -1,4 +1,4 @@
-"""What the motion and the weight alone load the joints with: k_tilde, and the gravity load."""
+"""Loads of joints by the motion and the weight alone: k_tilde, and the gravity load."""
 
 from __future__ import annotations
 

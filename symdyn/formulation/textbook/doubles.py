@@ -24,7 +24,7 @@ _FUNCTIONS = {op: _OWN[op] if op in _OWN else getattr(math, row.mpmath) for op, 
 
 
 class Doubles(Arithmetic):
-    """Evaluates nodes; the order of the steps is found once. What the walk gives a step is its index in the list of values."""
+    """Evaluates nodes; the order of the steps is found once. The walk gives each step its index in the list of values."""
 
     functions = _FUNCTIONS
 

@@ -68,5 +68,5 @@ def inverse_dynamics(tree: Tree, w_dot: Vector, a_0: np.ndarray | None = None,
 
 
 def outside(wrenches: Sequence[Wrench] | None, i: int) -> np.ndarray:
-    """What acts on link i from outside, (6,): moment first."""
+    """The load on link i from outside, (6,): moment first."""
     return zeros(6) if wrenches is None else np.concatenate([wrenches[i][1], wrenches[i][0]])

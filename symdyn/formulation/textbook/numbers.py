@@ -108,7 +108,7 @@ class NumericTree:
 
     def _numbers(self, nodes: Sequence[Node], values: Mapping[str, Any], digits: int | None,
                  doubles: Doubles) -> Callable[[Any], Any]:
-        """What takes these nodes, and exact numbers, to numbers."""
+        """Conversion of these nodes, and of exact numbers, to numbers."""
         convert: Callable[[Any], Any] = float
         if digits is None:
             result = doubles.at(values)

@@ -1,4 +1,4 @@
-"""What the lecture's pages name, link by link, as quantities that equations can print."""
+"""Quantities of the lecture's pages, link by link, as quantities that equations can print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every recursion of the lecture starts with: transforms, velocities, and the forces and accelerations they alone make."""
+"""Start of every recursion of the lecture: transforms, velocities, and the forces and accelerations they alone make."""
 
 from __future__ import annotations
 

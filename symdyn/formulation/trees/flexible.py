@@ -96,7 +96,7 @@ class FlexibleLink:
 
     @property
     def inertia(self) -> Inertia:
-        """What the deflection adds to the link's inertia, about the link's origin."""
+        """Change of the link's inertia by the deflection, about the link's origin."""
         return Inertia(0, self.h, self.I).moved(identity(), self.p)
 
     def coupling(self, column: int) -> Wrench:
@@ -126,7 +126,7 @@ class FlexibleLink:
         return (zeros(3), cross(self.h, g)), self.Ct.T @ g
 
     def kinetic_energy(self, omega: np.ndarray, v: np.ndarray) -> Any:
-        """What the deflection adds to it, J, for a twist of the link."""
+        """Change of it by the deflection, J, for a twist of the link."""
         v = v + cross(omega, self.p)
         momentum = cross(omega, self.h) + self.Ct @ self.eta_dot
         turning = self.I @ omega / 2 + self.Cr @ self.eta_dot

@@ -18,7 +18,7 @@ Wrench = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """Of one link, in its own axes: omega, alpha (3,), a: acceleration of its origin (3,), U (3, 3) as above."""
+    """Motion of one link, in its own axes: omega, alpha (3,), a: acceleration of its origin (3,), U (3, 3) as above."""
 
     omega: np.ndarray
     alpha: np.ndarray

@@ -1,4 +1,4 @@
-"""What a tree of links provides whatever the formulation: its equations, J, positions, energy, power, the user's outputs."""
+"""Quantities of a tree of links in every formulation: its equations, J, positions, energy, power, the user's outputs."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class TreeQuantities(Motion):
                            lambda values: forward(self.algebra.recorder, list(values), along))
 
     def contacts(self) -> np.ndarray:
-        """What a run with rigid contacts takes at a state, see ContactRows.numbers."""
+        """Numbers of a run with rigid contacts at a state, see ContactRows.numbers."""
         leaves = self._leaves(self.speeds)
         return self.recall("contact_rows").numbers(self.loads.contact_forces, lambda change: forward(  # type: ignore[no-any-return]
             self.algebra.recorder, self.rates, dict(zip(leaves, change, strict=True))))
@@ -92,7 +92,7 @@ class TreeQuantities(Motion):
         return self.recall("contact_rows").steps(self._leaves(self.speeds))  # type: ignore[no-any-return]
 
     def contact_spheres(self) -> np.ndarray:
-        """Of groups of contacts where their bodies are, how these move and what they weigh, see contact_groups.spheres."""
+        """Positions, velocities and masses of the bodies of groups of contacts, see contact_groups.spheres."""
         return spheres(self.model.groups, self.kinematics, self.loads)
 
     def compliant_contacts(self) -> np.ndarray:
@@ -374,17 +374,17 @@ class TreeQuantities(Motion):
         return self.expression(value)
 
     def events(self) -> np.ndarray:
-        """What vanishes at the events, (n_e,)."""
+        """Expressions that vanish at the events, (n_e,)."""
         with self.algebra.section("events"):
             return vector(*[self.expression(e.value) for e in self.model.events])
 
     def event_resets(self) -> np.ndarray:
-        """What the reset entries of the state become, event after event."""
+        """New values of the reset entries of the state, event after event."""
         with self.algebra.section("resets of events"):
             return vector(*[self.expression(becomes) for e in self.model.events for _, becomes in e.reset])
 
     def _point(self, point: Point) -> np.ndarray:
-        """What is asked of a point of a body, n-frame; see Point."""
+        """The requested quantity of a point of a body, n-frame; see Point."""
         kinematics = self.kinematics
         pose, at = self.loads.pose(point.body), self.algebra.constants(point.at)
         if point.quantity == "position":
@@ -409,7 +409,7 @@ class TreeQuantities(Motion):
         return self.algebra.constants(self.model.gravity)
 
     def joint_forces(self, gravity: bool, conservative: bool = True, other: bool = True) -> np.ndarray:
-        """What the loads give along each joint speed, (n_w,)."""
+        """Forces of the loads along each joint speed, (n_w,)."""
         applied = self.loads.applied(conservative, other)
         if gravity:
             g = self.gravity()

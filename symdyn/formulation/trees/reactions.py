@@ -1,4 +1,4 @@
-"""What every joint transmits: force and moment on its child, by one pass inwards over the bodies as they are.
+"""Reaction of every joint: force and moment on its child, by one pass inwards over the bodies as they are.
 
 Nothing is merged or regrouped here: bodies held by fixed joints have reactions, too. The cut load of a joint is all that passes
 from its parent to its child through it. Its reaction is the cut load less what acts along its speeds: joint forces (drives,

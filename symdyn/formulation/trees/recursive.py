@@ -51,7 +51,7 @@ class RecursiveEquations(MotionEquations):
         return self.explicit("gravity_load")
 
     def link(self, which: Body | str | int) -> LinkPage:
-        """What the lecture's pages name of one link: the body that a joint moves, its name, or its number from 1.
+        """Quantities of one link on the lecture's pages: the body that a joint moves, its name, or its number from 1.
 
         Raises SymdynError for a link that is not there.
         """
@@ -129,7 +129,7 @@ class RecursiveTree(TreeQuantities):
         demand_pivots(self.model, self.algebra.recorder, pivots)
 
     def reasons(self) -> list[str]:
-        """What it means, speed by speed, if S^T I^A S is not positive."""
+        """Reasons, speed by speed, for S^T I^A S that is not positive."""
         if self.own is None:
             return super().reasons()
         joints = joints_by_speed(self.model)

@@ -181,7 +181,7 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
 
 
 def _ranges(given: Compliance) -> list[Range]:
-    """What the numbers of a compliance may be."""
+    """Ranges of the numbers of a compliance."""
     result = [Range("stiffness", given.stiffness, reached=False), Range("exponent", given.exponent, 1.0),
               Range("dissipation", given.dissipation), Range("slip_speed", given.slip_speed, reached=False),
               Range("viscous", given.viscous)]
@@ -207,7 +207,7 @@ def numbers_of(ranges: Iterable[Range]) -> list[sp.Expr]:
 
 
 def ranges_of(given: Compliance, static: sp.Expr, kinetic: sp.Expr) -> list[Range]:
-    """What coefficients of a compliant contact may be."""
+    """Ranges of coefficients of a compliant contact."""
     friction = [Range("static friction", static), Range("kinetic friction", kinetic, reached=given.bristles is None)]
     if static != kinetic:
         friction.append(Range("static friction less kinetic friction", static - kinetic))
@@ -216,7 +216,7 @@ def ranges_of(given: Compliance, static: sp.Expr, kinetic: sp.Expr) -> list[Rang
 
 def compliance_faults(where: str, given: object, numbers: Callable[[Any], float | None], static: sp.Expr,
                       kinetic: sp.Expr) -> list[str]:
-    """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
+    """Faults of a compliance; numbers: gives the number of an expression, None where it has none."""
     if not isinstance(given, Compliance):
         return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
     result = [] if isinstance(given.located, bool) else [f"{where}: located is {shown(given.located)}; pass True or False"]

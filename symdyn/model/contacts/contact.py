@@ -120,7 +120,7 @@ class Contact:
 
     @property
     def ranges(self) -> list[Range]:
-        """What radii and lengths of its shapes, and its room in a bore, may be."""
+        """Ranges of radii and lengths of its shapes, and of its room in a bore."""
         result = [Range(what, length, reached=self._may_vanish(what)) for what, length in self.lengths.items()]
         return result if self.room is None else [*result, Range("room in the bore", self.room, reached=False)]
 

@@ -36,7 +36,7 @@ CENTRED = sp.Rational(1, 10**30)
 WRITTEN_OUT = 12
 # Splines of a cam end as they begin to this part.
 NEARLY = 1e-9
-# What heights are written in: real, and of names that no parameter has.
+# Variables of heights: real, and of names that no parameter has.
 REAL = (sp.Symbol("abscissa x", real=True), sp.Symbol("abscissa y", real=True))
 # Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
 AROUND = 12

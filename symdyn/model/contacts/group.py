@@ -83,7 +83,7 @@ class LoweredGroup:
 
     @property
     def constants(self) -> list[sp.Expr]:
-        """What depends on parameters alone."""
+        """Expressions that depend on parameters alone."""
         return [*self.coefficients, *[e for plane in self.planes for part in plane for e in part],
                 *[e for sphere in self.spheres for e in (sphere.radius, *sphere.center)]]
 

@@ -49,7 +49,7 @@ class Row:
 
 
 class JointElement:
-    """What stops, clutches, friction and ropes have in common; bounds: the numbers that are checked, with least and most."""
+    """Common part of stops, clutches, friction and ropes; bounds: the numbers that are checked, with least and most."""
 
     impact, law = NEWTON, "rigid"
 

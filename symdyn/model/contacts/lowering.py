@@ -1,4 +1,4 @@
-"""What contacts become: forces between their bodies, events, and for the rigid law rows that parameters switch.
+"""Lowering of contacts: forces between their bodies, events, and for the rigid law rows that parameters switch.
 
 A rigid contact has one row along its normal and one along each tangent. The force along row k is the quantity contact(NAME)[k].
 Parameters say which rows hold, NAME_closed and NAME_sticking (1 or 0 each), and which way it slides, NAME_sliding, in space
@@ -95,7 +95,7 @@ class RigidContact:
 
     @property
     def constants(self) -> list[sp.Expr]:
-        """What depends on parameters alone."""
+        """Expressions that depend on parameters alone."""
         return [self.static, self.kinetic, self.restitution]
 
 
@@ -118,7 +118,7 @@ class CompliantContact:
 
     @property
     def expressions(self) -> list[sp.Expr]:
-        """What it shows along a motion: gap, slip speed, forces, slips."""
+        """Its numbers along a motion: gap, slip speed, forces, slips."""
         return [self.gap, self.slip_speed, *self.forces, *self.rows[1:]]
 
     @property

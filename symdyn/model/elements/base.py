@@ -52,5 +52,5 @@ class Element:
         return {}
 
     def act(self, site: Site) -> Action:
-        """What it does at a site, on the scalars of its algebra."""
+        """Action of the element at a site, on the scalars of its algebra."""
         raise NotImplementedError

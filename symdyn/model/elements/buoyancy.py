@@ -22,7 +22,7 @@ from symdyn.tape.node import is_zero
 if TYPE_CHECKING:
     from symdyn.given import BodyOrName, Scalar, Vector
 
-# Of the whole volume: less is rounding.
+# Part of the whole volume below which a volume is rounding.
 LEAST = 1e-9
 
 
@@ -187,7 +187,7 @@ class _Bounds:
 
 
 def _bounds(boxes: Sequence[Box]) -> dict[int, _Bounds]:
-    """Of the boxes that are given by numbers, by their place in the list."""
+    """Bounds of the boxes whose sizes are numbers, by index in the list."""
     bounds = {}
     for k, box in enumerate(boxes):
         if all(e.is_number for e in (*box.size, *box.center)):

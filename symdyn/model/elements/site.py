@@ -1,4 +1,4 @@
-"""What an element of load gets about its body, and what it returns."""
+"""Arguments and results of an element of load at its body."""
 
 from __future__ import annotations
 

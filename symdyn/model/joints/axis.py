@@ -1,4 +1,4 @@
-"""What joints of one degree of freedom along or about an axis share."""
+"""Common part of joints of one degree of freedom along or about an axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every joint has: two bodies, a frame on each, coordinates; and what it must define: its motion."""
+"""Common part of all joints: two bodies, a frame on each, coordinates. Each kind defines its motion."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Modal(Joint):
 
     @property
     def record(self) -> dict[str, Any]:
-        """What pictures need, as plain data: names of the bodies at its ends and of the coordinates, and of the stations of
+        """Plain data for pictures: names of the bodies at its ends and of the coordinates, and of the stations of
         the beam the places (k, 3), displacements by the modes (k, 3, n), and their second derivatives (k, 3, n, n)."""
         beam = self.beam
         second = -beam.S[:, None] * beam.e[:, None, None]

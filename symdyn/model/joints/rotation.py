@@ -1,4 +1,4 @@
-"""What joints with three rotational degrees of freedom share, however their orientation is described."""
+"""Common part of joints with three rotational degrees of freedom, however their orientation is described."""
 
 from __future__ import annotations
 

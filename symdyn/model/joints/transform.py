@@ -52,7 +52,7 @@ class Transform:
     # -- what may be wrong with it
 
     def faults(self) -> list[str]:
-        """What is wrong with it, in words; nothing if it is a rigid motion that every coordinate has a part in."""
+        """Its faults, in words; nothing if it is a rigid motion that every coordinate has a part in."""
         if not self.samples.points:
             return [f"its transform has no real value at {TRIES} random places (coordinates in [-10, 10], parameters in "
                     "[0.5, 1.5]); check where roots, logarithms and divisions leave their domain, or shift the coordinates"]

@@ -1,4 +1,4 @@
-"""What water cuts off from the unit cube; see Cube in symdyn.tape.cube."""
+"""Part of the unit cube under water; see Cube in symdyn.tape.cube."""
 
 
 def symdyn_cut_corner(a, b, s, h, one, shares):

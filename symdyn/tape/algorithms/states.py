@@ -1,4 +1,4 @@
-"""What numeric algorithms need for many states at once."""
+"""Helpers of numeric algorithms for many states at once."""
 
 import math
 
