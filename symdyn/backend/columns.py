@@ -64,7 +64,7 @@ class Columns:
 
     @property
     def values(self) -> tuple[object, ...]:
-        """What the function returns besides derivatives."""
+        """Results of the function in addition to derivatives."""
         return ()
 
     @property

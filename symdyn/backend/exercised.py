@@ -54,7 +54,7 @@ class Rows:
         self.defined = self._finite()
 
     def margin(self, node: Node) -> np.ndarray:
-        """What must be positive of a checked step."""
+        """The value that must be positive, of a checked step."""
         return np.broadcast_to(self.number(node.args[1] if node.op == "guard" else node), (self.n,))
 
     def number(self, value: Any) -> Any:
@@ -133,7 +133,7 @@ def _numbers(values: Any) -> np.ndarray:
 
 
 def statements(tapes: Sequence[Tape]) -> set[Any]:
-    """What there is to exercise in tapes: every statement on which a result depends, of a choice both branches."""
+    """Statements to exercise in tapes: every statement on which a result depends, of a choice both branches."""
     result: set[Any] = set()
     for tape in tapes:
         for node in _valued(tape):

@@ -173,7 +173,7 @@ class Chart(NamedTuple):
 
 
 class JumpRecord(NamedTuple):
-    """What may jump in the right-hand side, the surface where it does, the part of the equations it is in, and what to write in
+    """A term that may jump in the right-hand side, the surface where it does, its part of the equations, and what to write in
     its place."""
 
     what: str

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Call(NamedTuple):
-    """What a function of a state was called with; None: left out. Of t left out is 0."""
+    """Arguments of a call of a function of a state; None: left out. Of t left out is 0."""
 
     t: Any = None
     x: Any = None

@@ -1,4 +1,4 @@
-"""What holds for a state of a module with constraints: residuals by name, rank of the Jacobian, uniqueness of multipliers."""
+"""Facts about a state of a module with constraints: residuals by name, rank of the Jacobian, uniqueness of multipliers."""
 
 from __future__ import annotations
 

@@ -276,7 +276,7 @@ def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved)
 
 
 def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Sequence[Site], law: str) -> list[Solved]:
-    """What an impact does: lam are the impulses, w the velocities after it; v: before it.
+    """Result of an impact: lam are the impulses, w the velocities after it; v: before it.
 
     restitution   of each site; law: "newton" or "poisson"
     """
@@ -555,7 +555,7 @@ class _Faceted:
                 self.M[row, first] = scale * friction
 
     def modes(self, z: np.ndarray, w: np.ndarray) -> tuple[Mode, ...]:
-        """What each contact does."""
+        """Mode of each contact."""
         small_z, small_w = (NOISE * max(float(np.abs(v).max(initial=0.0)), 1e-300) for v in (z, self.q))
         result: list[Mode] = []
         for index, site in enumerate(self.sites):

@@ -18,7 +18,7 @@ NUMBERS = "contact_coefficients"
 
 
 def impossible(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> dict[int, str]:
-    """What is wrong with numbers of contacts, by row; rows where nothing is are left out.
+    """Faults of numbers of contacts, by row; rows where nothing is are left out.
 
     t        of the starts, s
     starts   (n, n_x) or (1, n_x), params: (n, n_p) or (1, n_p), inputs: (n, n_in) or (1, n_in)
@@ -52,7 +52,7 @@ def _name(contact: ContactRecord | CompliantRecord) -> str:
 
 
 def _values(module: Module, t: float, starts: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """What expressions of parameters are, (n, n_values); not a number where they cannot be evaluated."""
+    """Values of expressions of parameters, (n, n_values); not a number where they cannot be evaluated."""
     together = len(params) == 1
     width = sum(not name for contact in _contacts(module) for _, name, *_ in contact.ranges)
     result = np.full((max(len(starts), len(inputs)) if together else len(params), width), np.nan)

@@ -40,6 +40,6 @@ def contradiction(of: Callable[[np.ndarray], Any], x: np.ndarray, rows: np.ndarr
 
 
 def message(what: str, slopes: tuple[float, float], t: float, by: str) -> str:
-    """What to say of a contradiction; what: the function, by: its arguments."""
+    """Message about a contradiction; what: the function, by: its arguments."""
     return (f"{what} contradicts its derivatives: at t = {t:.6g} it changes by {slopes[0]:.6g} along a direction of {by}, and by "
             f"{slopes[1]:.6g} by the derivatives that it came with; correct one of them")

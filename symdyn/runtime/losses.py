@@ -60,7 +60,7 @@ class Costs(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What passes zero where a cost may jump, (n, k), and its derivatives by the time, x and what a gradient is by,
+    """Expressions that pass zero where a cost may jump, (n, k), and its derivatives by the time, x and what a gradient is by,
     (n, k, 1 + n_x + n_by)."""
 
     values: np.ndarray

@@ -26,7 +26,7 @@ def real_parameters(module: Module, params: Any) -> np.ndarray:
 
 
 def negative_masses(module: Module, params: np.ndarray) -> dict[int, str]:
-    """What to say of rows of parameters (n, n_p) in which one that stands alone as the mass of a body is negative, by row."""
+    """Messages about rows of parameters (n, n_p) in which one that stands alone as the mass of a body is negative, by row."""
     result: dict[int, str] = {}
     masses = module.metadata.masses
     for name, column in zip(module.metadata.parameters, params.T, strict=True):

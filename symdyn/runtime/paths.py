@@ -30,7 +30,7 @@ def as_path(path: Any, what: str, example: str) -> Path:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """What the disk raises while a file or folder is written becomes an ArgumentError with the reason."""
+    """Errors of the disk while a file or folder is written become an ArgumentError with the reason."""
     try:
         yield
     except OSError as error:

@@ -29,7 +29,7 @@ class InputRaised(EvaluationError):
 
 
 def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, arguments: Sequence[Any]) -> Any:
-    """What a function of the user returns, asked at t and x for these arguments; what: how messages call it. Raises InputRaised
+    """Result of a function of the user, asked at t and x for these arguments; what: how messages call it. Raises InputRaised
     from whatever the function raises."""
     try:
         return function(*arguments)

@@ -36,7 +36,7 @@ DIRECTIONS, FAR, STEPS = 64, 1e6, 3
 
 
 def stronge(D: np.ndarray, v: np.ndarray, restitution: float, site: Site) -> Solved | None:
-    """What an impact does: impulses and velocities after it; None where it comes to no end.
+    """Result of an impact: impulses and velocities after it; None where it comes to no end.
 
     v   before it, along the normal and, with friction, the tangents
     """

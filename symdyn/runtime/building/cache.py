@@ -76,7 +76,7 @@ def load(source: str, stem: str, compiler: Compiler) -> ctypes.CDLL:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """What the disk raises while a file of the cache is written becomes a CacheError."""
+    """Errors of the disk while a file of the cache is written become a CacheError."""
     try:
         yield
     except OSError as error:

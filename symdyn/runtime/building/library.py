@@ -64,7 +64,7 @@ class Frame(ctypes.Structure):
 
 
 def reason_of(metadata: Metadata, code: int) -> str:
-    """What a return code of a function in C means."""
+    """Meaning of a return code of a function in C."""
     if code == NOT_FINITE:
         return "the result is not finite"
     return metadata.reasons[code - 1] if 0 < code <= len(metadata.reasons) else f"code {code}"
@@ -90,7 +90,7 @@ class CLibrary:
         return getattr(self.quick if quick else self.handle, f"{prefix}_{name}")
 
     def reason(self, code: int) -> str:
-        """What a return code means."""
+        """Meaning of a return code."""
         return reason_of(self.metadata, code)
 
     def evaluator(self, name: str) -> CEvaluator:
@@ -115,7 +115,7 @@ class DeviceText:
         self.source, self.metadata = source, metadata
 
     def reason(self, code: int) -> str:
-        """What a return code means."""
+        """Meaning of a return code."""
         return reason_of(self.metadata, code)
 
     def evaluator(self, name: str) -> Evaluator:

@@ -167,7 +167,7 @@ def is_whole(library: Path) -> bool:
 
 @functools.cache
 def _cpu() -> str:
-    """What distinguishes CPUs that may not run each other's native code."""
+    """Key of CPUs that may not run each other's native code."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
             block: list[str] = []

@@ -1,4 +1,4 @@
-"""What was generated for a module, as text: what modules, copies of them, workers of ensembles and the cache have of it."""
+"""Texts generated for a module, which modules, copies of them, workers of ensembles and the cache share."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Texts:
         return loaded(text, metadata, compiler)
 
     def as_plain(self) -> dict[str, dict[str, Any]]:
-        """What JSON and pickle take."""
+        """Plain data for JSON and pickle."""
         return {key: {"source": text, "metadata": metadata.as_plain()} for key, (text, metadata) in self._made.items()}
 
     def _key(self, what: str | RightSide) -> str:

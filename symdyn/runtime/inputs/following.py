@@ -29,7 +29,7 @@ SEARCHED, HALVINGS, JUMPED = 8, 40, 1e-6
 JUMP = 1e-9
 NO_STATE = np.zeros(0)
 PARTS = ("value", "rate", "acceleration")
-# What the names of a motion's rate and acceleration end in.
+# Endings of the names of a motion's rate and acceleration.
 RATES = ("_dot", "_ddot")
 
 

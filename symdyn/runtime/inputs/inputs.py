@@ -246,7 +246,7 @@ class Inputs:
 
 
 def not_finite(names: Sequence[str], values: Any, t: float) -> str:
-    """What to add to a message where a function failed: inputs that are not finite there."""
+    """Addition to a message where a function failed: inputs that are not finite there."""
     rows = () if values is None else values
     wrong = [f"{name} is {value:g}" for name, value in zip(names, rows, strict=False) if not np.isfinite(value)]
     return f"; the input {', '.join(wrong)} at t = {t:.6g}" if wrong else ""

@@ -62,7 +62,7 @@ class Sampled(OverTime):
 
 
 class SampleRows(NamedTuple):
-    """What a controller has set: when its values took effect, t (n,), and the values (n,)."""
+    """Values that a controller has set: when its values took effect, t (n,), and the values (n,)."""
 
     t: np.ndarray
     values: np.ndarray
@@ -77,7 +77,7 @@ class Sampler:
     what: str
 
     def values(self, t: float, x: np.ndarray) -> np.ndarray:
-        """What the function says, (n,). Raises InputRaised from what it raises, ArgumentError for what does not fit."""
+        """Values of the function, (n,). Raises InputRaised from what it raises, ArgumentError for what does not fit."""
         given = called(self.sampled.function, t, x, self.what, (t, x.copy()))
         try:
             values = np.asarray(given, dtype=float).reshape(-1)

@@ -102,7 +102,7 @@ class Table(OverTime):
         return Pieces(t, coefficients)
 
     def beyond(self, span: tuple[float, float]) -> str:
-        """What to say of a run that goes beyond the table where that is an error; empty if it does not."""
+        """Message about a run that goes beyond the table where that is an error; empty if it does not."""
         first, last = float(self.times[0]), float(self.times[-1])
         begin, end = min(span), max(span)
         slack = ROUNDING * max(abs(first), abs(last), abs(begin), abs(end))

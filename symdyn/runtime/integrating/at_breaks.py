@@ -57,7 +57,7 @@ class Breaks:
         return np.asarray(across)
 
     def doubts(self) -> list[str]:
-        """What to warn of."""
+        """Warnings."""
         if not self.left:
             return []
         return [f"{self.module.name}: the motion passes kinks of the equations too often for a gradient across all of them: at "

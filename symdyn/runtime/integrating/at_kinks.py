@@ -40,7 +40,7 @@ def has_kink(values: Callable[[np.ndarray], np.ndarray], x: np.ndarray, k: int) 
 
 
 def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, integral: Cost | None = None) -> list[str]:
-    """What to warn of where an entry of the state stays at a kink of the right-hand side, or of the integral of a loss, from one
+    """Warnings where an entry of the state stays at a kink of the right-hand side, or of the integral of a loss, from one
     of the rows x (n_t, n_x) at times t to the next."""
     result = []
     for k in range(x.shape[1]):
@@ -60,7 +60,7 @@ def staying(module: Module, request: Request, t: np.ndarray, x: np.ndarray, inte
 
 
 def ending(module: Module, request: Request, t: float, x: np.ndarray, end: Cost) -> list[str]:
-    """What to warn of where the cost of the end has a kink at the end."""
+    """Warnings where the cost of the end has a kink at the end."""
     if end.smooth:
         return []
     values = lambda states: end(np.full(len(states), t), states, request.inputs.rows(np.full(len(states), t), states)).values

@@ -33,7 +33,7 @@ TRIAL_STEPS, LIMITED, LONGER = 100, 5.0, 10.0
 # if the motion is smooth for its eigenvalues (misses a cubic over the second half of the trial by less than this part of its
 # range) and so many steps are to come that compiling the Jacobian pays.
 WORTH, SMOOTH, MANY = 0.1, 0.01, 1000
-# What is not smooth may ring and die out. Eigenvalues of this part of the largest ring; implicit steps that follow the ringing
+# Rough motion may ring and die out. Eigenvalues of this part of the largest ring; implicit steps that follow the ringing
 # cost so many times what explicit ones do (1.7 for rtol = 1e-4, 2.9 for 1e-8, of a mass on a spring). Steps in which an implicit
 # trial run reaches its lengths: it begins with a short one, and each may be six times as long as the one before. The relative
 # tolerance of one that is to go across the ringing.

@@ -33,7 +33,7 @@ def distances(module: Module, x: np.ndarray) -> np.ndarray:
 
 
 def at_lock(module: Module, x: np.ndarray) -> str:
-    """What to add to a message where a run stopped: that angles are at gimbal lock, if they are."""
+    """Addition to a message where a run stopped: that angles are at gimbal lock, if they are."""
     charts = module.metadata.charts
     return "".join(f"; the {sequence} angles of joint {joint} are within {d:.2g} rad of gimbal lock ({INSTEAD})"
                    for (joint, sequence, *_), d in zip(charts, distances(module, x).ravel(), strict=True) if d < AT)

@@ -44,7 +44,7 @@ class Chatter:
         self.found, self.since, self.steps_then = 0, self.t, 0
 
     def __call__(self, t: float, x: np.ndarray, n_steps: int) -> str:
-        """What to say of a run that chatters at (t, x) after so many steps; "" if it does not, or not for certain."""
+        """Message about a run that chatters at (t, x) after so many steps; "" if it does not, or not for certain."""
         done = n_steps - self.n_steps
         if done <= 0:
             return ""
@@ -67,7 +67,7 @@ class Chatter:
         return ""
 
     def of_small_steps(self, t: float, x: np.ndarray) -> str:
-        """What to add to a message where a step became too small; "" where the motion does not slide."""
+        """Addition to a message where a step became too small; "" where the motion does not slide."""
         result = self._sliding(t, x[:self.n_state], WITHIN)
         return "" if result is None else f"; {self._drive(*result)}; {self._remedy(result[0])}"
 
@@ -116,5 +116,5 @@ class Chatter:
 
 
 def chatter_of(module: Module, request: Request) -> Chatter | None:
-    """What looks for chattering in a run; None where nothing jumps."""
+    """The search for chattering in a run; None where nothing jumps."""
     return Chatter(module, request) if module.metadata.switches else None

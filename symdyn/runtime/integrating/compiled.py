@@ -178,7 +178,7 @@ class Run:
         ctypes.memmove(self.address, checkpoint, self.size)
 
     def report(self) -> Report:
-        """What the run reports now."""
+        """The present report of the run."""
         out, states = RunReport(), np.zeros((2, self.n_x))
         self.library.function("simulation_report")(self.address, ctypes.byref(out), ctypes.c_void_p(states.ctypes.data))
         return Report(out, *states)
@@ -270,7 +270,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
 
 
 def _short_steps(module: Module, request: Request, method: str, field: RightSide | None) -> ShortSteps | None:
-    """What looks for steps that are far too short; None where their length is given or follows from a table of inputs."""
+    """The search for steps that are far too short; None where their length is given or follows from a table of inputs."""
     if method == "gauss" or request.inputs.has_kinks:
         return None
 
@@ -282,7 +282,7 @@ def _short_steps(module: Module, request: Request, method: str, field: RightSide
 
 
 def moved_far(name: str, most: float, t: float, sensitive: bool = False) -> str:
-    """What to say of a step whose end, though its error was tolerated, was far off the constraints: rounding, divided by the
+    """Message about a step whose end, though its error was tolerated, was far off the constraints: rounding, divided by the
     distance from a singular configuration, or in sensitivities by its square."""
     if not most > FAR:
         return ""
@@ -293,7 +293,7 @@ def moved_far(name: str, most: float, t: float, sensitive: bool = False) -> str:
 
 
 def _doubt(module: Module, request: Request, method: str, report: RunReport) -> str:
-    """What to say of steps whose errors the method did not see, or which are not those that were requested."""
+    """Message about steps whose errors the method did not see, or which are not those that were requested."""
     if method != "gauss":
         return ""
     rough, divided = report.n_rough, report.n_divided if request.first_step else 0
@@ -372,13 +372,13 @@ def _series_reason(run: Run, report: Report) -> str:
 
 
 def _dependent(module: Module, run: Run, t: float, x: np.ndarray) -> str:
-    """What to add to a message where constraints depend on each other, unlike at the start."""
+    """Addition to a message where constraints depend on each other, unlike at the start."""
     n, request = module.metadata.sizes.x, run.request
     return lost_rank(module, t, x[:n], request.p, request.x0[:n], request.span[0])
 
 
 def _inputs(module: Module, run: Run, t: float, x: np.ndarray) -> str:
-    """What to add to a message where an input is not finite; a function of the user is asked once more."""
+    """Addition to a message where an input is not finite; a function of the user is asked once more."""
     request = run.request
     try:
         return not_finite(module.metadata.inputs, request.inputs.at(t, x[:request.n_state].copy()), t)

@@ -137,7 +137,7 @@ class ContactChain:
         weights[n_x:] += row[n_x:]
 
     def _gathered(self, t: float) -> str:
-        """What to add of impacts that accumulate near a time."""
+        """Addition to a message about impacts that accumulate near a time."""
         near = [end for _, _, end in self.accumulated if 0 <= end - t <= NEAR * (end - self.request.span[0])]
         return (f"; impacts accumulate near t = {near[0]:.6g} s: end the motion before them, or take simulate(..., "
                 "sensitivities=[...]), which goes on with fewer digits") if near else ""

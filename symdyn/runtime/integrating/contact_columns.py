@@ -28,7 +28,7 @@ Function = Callable[[float, np.ndarray, np.ndarray, Any], np.ndarray]
 STEPS, AGREE, ENOUGH = (1e-3, 1e-4, 1e-5), 1e-6, 1e-11
 # The least size of coordinates, m.
 SMALL = 1e-9
-# What rounding of values may make of differences, by their size.
+# Differences that rounding of values may make, by their size.
 ROUNDING = 1e-14
 # Weights of the values at one, two and three steps: of sixth and fourth order.
 SIXTH, FOURTH = np.array([45.0, -9.0, 1.0]) / 60, np.array([8.0, -1.0, 0.0]) / 12

@@ -84,7 +84,7 @@ HOLDS = 1e30
 
 
 class Numbers(NamedTuple):
-    """What the function "contacts" gives: per contact gap, coefficients of friction, restitution; per row the slip, the
+    """Results of the function "contacts": per contact gap, coefficients of friction, restitution; per row the slip, the
     acceleration without contact forces, the force; D (n, n), M^-1 J^T (n_u, n) and N M^-1 J^T (n_q, n)."""
 
     gap: np.ndarray
@@ -100,7 +100,7 @@ class Numbers(NamedTuple):
 
 
 def rows_of(records: Sequence[ContactRecord]) -> list[tuple[int, ...]]:
-    """Places of the rows of each contact."""
+    """Indices of the rows of each contact."""
     ends = np.cumsum([0, *[record.rows for record in records]])
     return [tuple(range(a, b)) for a, b in pairwise(ends.tolist())]
 
@@ -121,7 +121,7 @@ class _Evaluated:
 
 
 def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
-    """What the laws of contact take at a state."""
+    """Arguments of the laws of contact at a state."""
     known: _Evaluated = module._remembered("contact_numbers", lambda: _Evaluated(module))
     return _numbers_of(module.metadata, known(t, x[:module.metadata.sizes.x], p, inputs))
 
@@ -304,7 +304,7 @@ class _Doubt:
 
 
 class _Table:
-    """What a module says of its contacts: places of their rows, parameters and events.
+    """Contacts of a module: indices of their rows, parameters and events.
 
     Raises ArgumentError where parameters that say in which mode contacts are have become numbers.
     """

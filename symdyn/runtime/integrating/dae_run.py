@@ -121,7 +121,7 @@ class Stabilized:
 
     @property
     def step_size(self) -> float:
-        """Of the latest step, s."""
+        """Length of the latest step, s."""
         return abs(float(self.t - self.solver.t_old))
 
     @property

@@ -81,12 +81,12 @@ def rows_of(module: Module, happened: Sequence[Happened], n_x: int) -> dict[str,
 
 
 def ended(module: Module, k: int, t: float) -> str:
-    """What to say of a motion that an event has ended."""
+    """Message about a motion that an event has ended."""
     return f"event {module.metadata.events[k].name} ended the motion at t = {t:.9g} s"
 
 
 def at_once(module: Module, happened: Sequence[Happened], near: float) -> str:
-    """What to say where resets are followed by the same event at once, again and again; near: such a time, s."""
+    """Message where resets are followed by the same event at once, again and again; near: such a time, s."""
     last = happened[-1]
     times = np.array([one.t for one in happened if module.metadata.events[one.event].reset])
     gaps = np.abs(np.diff(times)) <= near
@@ -97,12 +97,12 @@ def at_once(module: Module, happened: Sequence[Happened], near: float) -> str:
 
 
 def not_known(module: Module, k: int) -> str:
-    """What to say where the quantity of an event is not a number."""
+    """Message where the quantity of an event is not a number."""
     return f"event {module.metadata.events[k].name} cannot be evaluated: the result is not finite"
 
 
 def too_quick(module: Module, result: Sequence[tuple[int, float]]) -> str:
-    """What to warn of where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
+    """Warning where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
     if not result:
         return ""
     names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in result]
@@ -112,7 +112,7 @@ def too_quick(module: Module, result: Sequence[tuple[int, float]]) -> str:
 
 
 def not_proved(module: Module, result: Sequence[tuple[int, float]], spacing: float) -> str:
-    """What to warn of where quantities may pass zero between their samples, with the time from when on; "" where none does, and
+    """Warning where quantities may pass zero between their samples, with the time from when on; "" where none does, and
     where the user has chosen the spacing of samples."""
     if not result or spacing:
         return ""
@@ -123,7 +123,7 @@ def not_proved(module: Module, result: Sequence[tuple[int, float]], spacing: flo
 
 
 def entangled(module: Module, happened: Sequence[Happened], times: Sequence[float]) -> str:
-    """What to warn of where derivatives across events at one time, the first of these times, depend on their order; "" where none
+    """Warning where derivatives across events at one time, the first of these times, depend on their order; "" where none
     do."""
     if not times:
         return ""
@@ -136,7 +136,7 @@ def entangled(module: Module, happened: Sequence[Happened], times: Sequence[floa
 
 
 def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
-    """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, the
+    """Warning where events depend on functions, about which nothing is known between samples: those of the user, the
     inputs that are given by functions, and those that are not enclosed; "" where none does, and where the user has chosen the
     spacing of samples. Kinks of compliant contacts, at which steps end, change nothing but the error of a step."""
     if look is None or spacing or not look.any():
@@ -188,7 +188,7 @@ class Locator:
         self.failed = ""  # or fails at it
 
     def values(self, t: float, x: np.ndarray) -> np.ndarray:
-        """What vanishes at the events, (n_e,); NaN where that is not known of one that is not looked for.
+        """Expressions that vanish at the events, (n_e,); NaN where that is not known of one that is not looked for.
 
         Raises EvaluationError where it is not known of one that is.
         """
@@ -222,7 +222,7 @@ class Locator:
         self.now = value = self.values(t, x)
         change = self.values(t + step, x + step * xd) - value
         fired = np.isin(np.arange(len(value)), self.fired)
-        # What has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it from there.
+        # A quantity that has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it.
         left = 2 * np.abs(self.left) + np.abs(change)
         self.size = np.abs(x)
         at_zero = (np.abs(value) <= self._noise(t, x)) | (fired & (np.abs(value) <= left))
@@ -313,7 +313,7 @@ class Locator:
         return np.vstack([self.now, values]), states
 
     def _noise(self, t: float, x: np.ndarray) -> np.ndarray:
-        """What the quantities change by with the rounding of t and of a state within the latest step."""
+        """Changes of the quantities by the rounding of t and of a state within the latest step."""
         eps = np.finfo(float).eps
         nearby = x + eps * panels.roundings(len(x)) * self.size
         return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))

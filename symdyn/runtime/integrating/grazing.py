@@ -52,7 +52,7 @@ def jumping(module: Module, request: Request, t: np.ndarray, before: np.ndarray,
 
 
 def without_rate(module: Module, event: int, t: float) -> str:
-    """What to say of an event that grazes."""
+    """Message about an event that grazes."""
     return (f"{module.name}: the quantity of the event {module.metadata.events[event].name} vanishes at t = {t:.9g} s without a "
             "rate that the tolerances resolve, so that its time has no derivative; take another quantity, another start, or "
             "events=[...] without it")

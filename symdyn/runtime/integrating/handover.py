@@ -54,7 +54,7 @@ def _left(request: Request, parts: list[Outcome]) -> int | None:
 
 
 def _rest(request: Request, parts: list[Outcome], max_steps: int | None) -> Request:
-    """What is left to do from where the latest part stopped."""
+    """The rest of the run from where the latest part stopped."""
     t, x = float(parts[-1].t[-1]), np.ascontiguousarray(parts[-1].x[-1])
     times = request.times
     if times is not None:

@@ -139,7 +139,7 @@ class _Pieces:
         return outcome
 
     def _chatters(self, t: float, x: np.ndarray) -> str:
-        """What to say of a run that chatters; "" if it does not. Steps that instants cut short are no sign of it: looks are made
+        """Message about a run that chatters; "" if it does not. Steps that instants cut short are no sign of it: looks are made
         where they are far shorter than the pieces, which may be too short to find it within one."""
         if self.chatter is None or self.n_steps - self.chatter.n_steps < self.between_looks:
             return ""

@@ -68,7 +68,7 @@ def check_spheres_apart(module: Module, t: float, x: np.ndarray, p: np.ndarray, 
 
 
 def add_groups(module: Module, record: Moreau, memory: Memory) -> None:
-    """What the record has of groups."""
+    """Add groups of contacts to the record."""
     groups, places = module.metadata.contact_groups, np.dtype("long")
     bodies, planes = [len(group.bodies) for group in groups], [group.planes for group in groups]
     n, kind = sum(bodies), n_speeds(groups)

@@ -103,7 +103,7 @@ class Integral:
 
     @property
     def tolerance(self) -> float:
-        """What the integral may be off by in a step."""
+        """Bound of the error of the integral in a step."""
         return (1.0 if self.cost.smooth else ROUGH) * (self.request.rtol * self.size + self.slack)
 
     def judge(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, costs: Costs,
@@ -218,7 +218,7 @@ class Integral:
         self.left, self.left_slope = self.left + own, max(self.left_slope, slope)
 
     def doubts(self) -> list[str]:
-        """What to warn of."""
+        """Warnings."""
         result = list(dict.fromkeys(self.jumps))
         if self.left > 1 or self.left_slope > 1:
             size = f"by as much as {self.left * self.tolerance:.3g}" if self.left > 1 else "in its derivatives"

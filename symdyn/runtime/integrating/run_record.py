@@ -1,4 +1,4 @@
-"""What a run of the compiled integrator reports, and what its codes mean: mirrors of the declarations in C."""
+"""Reports of a run of the compiled integrator, with the meanings of its codes: mirrors of the declarations in C."""
 
 from __future__ import annotations
 

@@ -283,7 +283,7 @@ class Run:
         return why + self.dependent()
 
     def dependent(self) -> str:
-        """What to add to a message where constraints depend on each other, unlike at the start."""
+        """Addition to a message where constraints depend on each other, unlike at the start."""
         n, p, start = self.request.n_state, self.request.p, self.request.x0
         places = [(self.here, self.state), *(self.field.failed if self.field.trouble else ())]
         result = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)

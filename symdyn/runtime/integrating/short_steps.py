@@ -47,7 +47,7 @@ class ShortSteps:
         self.warned = False
 
     def __call__(self, t: float, x: np.ndarray, n_steps: int) -> tuple[str, bool]:
-        """What to say at (t, x) after so many steps, and whether the run ends there, else it is a warning; "" if nothing, or once
+        """Message at (t, x) after so many steps, and whether the run ends there, else it is a warning; "" if nothing, or once
         it has been said."""
         done = n_steps - self.n_steps
         if done <= 0 or self.warned:
@@ -105,7 +105,7 @@ class ShortSteps:
         return (k, step, float(ways[:, k].max())) if weight[k] > 1e-3 else None
 
     def _slides(self, result: Outcome, k: int) -> str:
-        """What to say where the motion slides along a jump that entry k passes; "" where it does not."""
+        """Message where the motion slides along a jump that entry k passes; "" where it does not."""
         n, middle = self.request.n_state, len(result.t) // 2
         t, x = result.t, result.x[:, :n]
         span = t[-1] - t[0]

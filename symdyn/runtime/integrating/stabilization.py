@@ -40,7 +40,7 @@ class Stabilization:
 
 @dataclass(frozen=True)
 class Corrections:
-    """What projections did over a run: the largest change of q and of u after a step (norms), how many steps were changed
+    """Projections over a run: the largest change of q and of u after a step (norms), how many steps were changed
     noticeably, and how often the functions that compute corrections were evaluated."""
 
     position: float = 0.0
@@ -246,7 +246,7 @@ class DriftCheck:
         self.evaluator.set_params(params)
 
     def __call__(self, t: float, x: np.ndarray) -> str:
-        """What to say if a position is off by more than LOST, else nothing."""
+        """Message if a position is off by more than LOST, else nothing."""
         known = names(self.module)
         rows = np.abs(self.evaluator.one(t, x[:self.n_state], self.module.motions_at(t))[:len(known)]) / self.length
         worst = int(rows.argmax())
@@ -257,18 +257,18 @@ class DriftCheck:
 
 
 def not_converged(constraint: str, residual: float, of_speeds: bool = False) -> str:
-    """What to say where corrections do not converge."""
+    """Message where corrections do not converge."""
     return f"{constraint} stays violated by {residual:.3g} m" + "/s" * of_speeds
 
 
 def reset_rejected(entry: str, gap: float) -> str:
-    """What to say where a reset asks for what the constraints do not allow."""
+    """Message where a reset asks for what the constraints do not allow."""
     return (f"the constraints do not let {entry} be what the reset of an event makes it: the nearest is {gap:.3g} off; reset "
             "fewer coordinates and speeds, from which the others follow, or to values that the constraints allow")
 
 
 def not_smooth(entry: str) -> str:
-    """What to say where sensitivities do not go across a reset that the constraints carry on; entry: what they do not let change
+    """Message where sensitivities do not go across a reset that the constraints carry on; entry: what they do not let change
     as its reset does, "" where coordinates are off them."""
     if entry:
         return (f"the constraints allow what the reset of an event makes of {entry} at these numbers alone: it has no "

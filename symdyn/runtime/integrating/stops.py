@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
-    """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
+    """Addition to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
     locked = at_lock(module, x)
     if "mass_matrix" not in module.functions or not module.metadata.u or names(module):
         return locked  # under constraints a singular mass matrix is nothing special
@@ -34,7 +34,7 @@ def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> s
 
 
 def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.ndarray, t0: float) -> str:
-    """What to add to a message where a run stopped: whether constraints depend on each other there, unlike at the start."""
+    """Addition to a message where a run stopped: whether constraints depend on each other there, unlike at the start."""
     if not names(module) or not np.isfinite(x).all():
         return ""
     try:

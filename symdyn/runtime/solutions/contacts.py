@@ -1,4 +1,4 @@
-"""What contacts did in a motion."""
+"""Contacts in a motion."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from symdyn.runtime.solutions import tables as run_tables
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
-# What moves by less, relative to the mechanism, is not seen in a picture.
+# Smaller motion, relative to the mechanism, is not seen in a picture.
 _SEEN = 1e-3
 
 
@@ -80,7 +80,7 @@ def _times(solution: Solution) -> list[tuple[str, float]]:
 
 
 def _generated(solution: Solution) -> str:
-    """What was generated, what was skipped and why, and operation counts; nothing for a module that was loaded from files."""
+    """Parts generated, parts skipped and why, and operation counts; nothing for a module that was loaded from files."""
     try:
         return str(solution.module.report())
     except ArgumentError:
