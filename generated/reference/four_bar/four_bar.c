@@ -37,7 +37,7 @@
 // To use it: compute the constants once with four_bar_prologue, then call the functions; each returns 0, or a code
 // that four_bar_reason explains. Nothing is allocated, nothing is global. main.c next to this file is an example.
 
-// What all parts need: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
+// Needs of all parts: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
 
 double sin(double), cos(double), tan(double), asin(double), acos(double), atan(double), atan2(double, double);
 double sinh(double), cosh(double), tanh(double), asinh(double), acosh(double), atanh(double);
@@ -80,7 +80,7 @@ static inline int symdyn_all_finite(const double *values, int n) {
 
 // The problem of a run, and its inputs at a time.
 
-// What the right-hand side needs besides t and x.
+// Arguments of the right-hand side in addition to t and x.
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
 // cubic, its ends held), constants.
@@ -1504,7 +1504,8 @@ SYMDYN_LINKED int symdyn_field(const symdyn_problem *problem, double t, const do
 // Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
 // error estimate, p. 254). The coefficients are those of the authors' code DOP853.
 
-// What all parts of the integrator of one mechanism need. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
+// Declarations of all parts of the integrator of one mechanism. SYMDYN_MODEL: its sizes, tables and the functions that are
+// integrated.
 
 // Coefficients of the method: numbers of stages, of slopes, of rows of the dense output; times and slopes of stages.
 #define SYMDYN_STAGES 12
@@ -1601,7 +1602,7 @@ typedef struct {
     double t_rough;                      // the latest of these
 } symdyn_report;
 
-// What a run returns.
+// Results of a run.
 
 enum {
     // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.

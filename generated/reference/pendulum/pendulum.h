@@ -101,7 +101,7 @@ int pendulum_inverse_dynamics_rows(pendulum_frame *frame);
 
 #ifndef SYMDYN_PROBLEM_TYPE
 #define SYMDYN_PROBLEM_TYPE
-// What the right-hand side needs besides t and x.
+// Arguments of the right-hand side in addition to t and x.
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
 // cubic, its ends held), constants.

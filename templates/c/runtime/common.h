@@ -1,4 +1,5 @@
-// What all parts of the integrator of one mechanism need. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
+// Declarations of all parts of the integrator of one mechanism. SYMDYN_MODEL: its sizes, tables and the functions that are
+// integrated.
 
 #pragma once
 

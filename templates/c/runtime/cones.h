@@ -60,7 +60,7 @@ static void symdyn_cones_total(const symdyn_cones *c, const double *P, double *d
     }
 }
 
-// What every contact does to itself.
+// Effect of every contact on itself.
 static void symdyn_cones_prepare(symdyn_cones *c) {
     for (long i = 0; i < c->n; i++) {
         const long m = c->first[i + 1] - c->first[i], lead = symdyn_cones_lead(c, i);

@@ -19,7 +19,7 @@ static int symdyn_event_values(symdyn_run *run, double t, const double *x, doubl
     return reason || bad >= 0 ? symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, reason ? -1 : bad, t, x) : 0;
 }
 
-// What the quantities change by with the rounding of t and of a state x within the latest step. Returns 0 or the failure.
+// Changes of the quantities by the rounding of t and of a state x within the latest step. Returns 0 or the failure.
 static int symdyn_event_noise(symdyn_run *run, double t, const double *x, double *noise) {
     double y[SYMDYN_NX], there[SYMDYN_N_EVENTS];
     int failure;

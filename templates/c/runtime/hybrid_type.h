@@ -52,7 +52,7 @@ typedef struct {
     int *old_mode, *old_still, *old_passed, *ruled_out, *look, *leaves;
     double *old_sign, *old_x, *rows_of_events, *states, *ahead;
 
-    // What it has done. Output times with states; phases with their begin, end, parameters, modes, and how many output times,
+    // Results. Output times with states; phases with their begin, end, parameters, modes, and how many output times,
     // events and impacts there are by their end; events and impacts.
     double *times, *out;
     long n_times, n_written;

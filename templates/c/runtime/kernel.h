@@ -1,4 +1,4 @@
-// What kernels have of CUDA C, and in C in its place.
+// Words of CUDA C in kernels, and their replacements in C.
 #pragma once
 
 #if defined(__CUDACC__)

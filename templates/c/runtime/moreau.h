@@ -214,7 +214,7 @@ static long symdyn_earlier(const symdyn_moreau *s, long i) {
     return -1;
 }
 
-// What friction of a contact is bounded by, in a step of length h: a coefficient, of friction of a joint an impulse.
+// Bound of friction of a contact, in a step of length h: a coefficient, of friction of a joint an impulse.
 static double symdyn_bound(const symdyn_moreau *s, long i, int sticks, double h) {
     const double *coefficients = symdyn_coefficients(s, i);
     return coefficients[sticks ? 0 : 1] * (symdyn_bounded(s, i) ? h : 1.0);
@@ -227,7 +227,7 @@ static int symdyn_still(const symdyn_moreau *s, const symdyn_cones *c, long i) {
     return sqrt(square) <= s->tolerance;
 }
 
-// What contacts bring into a step from the one before: impulses to start from, whether they stuck; bounds of friction.
+// Memory of contacts from the step before: impulses to start from, whether they stuck; bounds of friction.
 static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c, double h) {
     for (long i = 0; i < c->n; i++) {
         const long old = symdyn_earlier(s, i), r = c->first[i];
@@ -343,7 +343,7 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
     return 0;
 }
 
-// What orders contacts: those with a name first, then pairs by their first body.
+// Order of contacts: those with a name first, then pairs by their first body.
 static long symdyn_order(const symdyn_moreau *s, const long *a, const long *b, long i, long n) {
     return i >= n ? s->n_given + s->n_bodies : b[i] < 0 ? a[i] : s->n_given + a[i];
 }

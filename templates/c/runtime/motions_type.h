@@ -1,4 +1,4 @@
-// What many motions of one mechanism are computed from, and written to.
+// Arguments and results of many motions of one mechanism.
 #pragma once
 
 #include "report_type.h"

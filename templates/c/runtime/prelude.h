@@ -1,4 +1,4 @@
-// What all parts need: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
+// Needs of all parts: the math library, fused sums, what is exported. Nothing is included, so that no header is needed.
 #pragma once
 
 #if SYMDYN_SINGLE

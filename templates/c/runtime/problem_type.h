@@ -1,4 +1,4 @@
-// What the right-hand side needs besides t and x.
+// Arguments of the right-hand side in addition to t and x.
 #pragma once
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise

@@ -5,7 +5,7 @@
 #include "pivots.h"
 #include "projection.h"
 
-// What an entry of [q; u] counts by: angles count times the length.
+// Weight of an entry of [q; u]: angles count times the length.
 static double symdyn_arm(const symdyn_run *run, int i) {
     return (i < SYMDYN_NQ ? symdyn_angles[i] : symdyn_turning[i - SYMDYN_NQ]) ? run->problem.length : 1.0;
 }

@@ -1,4 +1,4 @@
-// What a run returns.
+// Results of a run.
 #pragma once
 
 enum {

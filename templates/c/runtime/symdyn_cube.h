@@ -1,4 +1,4 @@
-// What water cuts off from the unit cube; see Cube in symdyn/tape/cube.py.
+// Part of the unit cube under water; see Cube in symdyn/tape/cube.py.
 #pragma once
 
 #include "prelude.h"
