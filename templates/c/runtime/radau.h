@@ -36,12 +36,13 @@ static int symdyn_begin(symdyn_run *run) {
     run->method.tolerance = r / run->method.ease;
     run->method.tried = run->method.warm = run->method.current = 0;
     run->method.eta = run->method.theta = 1.0;
-    run->method.gap = run->method.h_quiet = 0.0;
+    run->method.gap = run->method.h_quiet = run->method.h_factors = 0.0;
     run->method.h_gap = run->h_max;
     return 0;
 }
 
-// The matrices of Newton's iteration for steps of length h from (t, x), factorized. Returns 0 or a failure.
+// The matrices of Newton's iteration for steps of length h from (t, x), factorized; those of the step
+// before serve again where neither the Jacobian nor the length is another one. Returns 0 or a failure.
 static int symdyn_prepare(symdyn_run *run, double h) {
     if (run->method.theta > 0.01 && !run->method.current) {
 #if SYMDYN_BANDED
@@ -54,11 +55,15 @@ static int symdyn_prepare(symdyn_run *run, double h) {
         for (int i = 0; i < SYMDYN_ENTRIES; i++)
             if (!(fabs(run->method.jacobian[i]) <= symdyn_huge)) run->method.jacobian[i] = 0.0;  // infinite ones: no help
         run->method.current = 1;
+        run->method.h_factors = 0.0;
     }
+    if (h == run->method.h_factors) return 0;
+    run->method.h_factors = 0.0;
     for (int k = 0; k < SYMDYN_ROOTS; k++) {
         run->n_factorizations++;
         if (symdyn_newton_matrix(&run->method, h, k)) return SYMDYN_STEP_TOO_SMALL;
     }
+    run->method.h_factors = h;
     return 0;
 }
 

@@ -8,7 +8,7 @@ typedef struct {
     double gap, h_gap, h_quiet;          // of the latest step tried: its gap, its length; of shorter ones gaps are rounding
     double ease, tolerance;  // the estimate is of lower order than the step: ease 10 r^(1/4) of it counts; r/ease, r as rtol
     double eta, theta;       // of Newton's iteration: its error by the latest change, its rate
-    double jacobian[SYMDYN_ENTRIES];
+    double jacobian[SYMDYN_ENTRIES], h_factors;  // length of the step that the factors are for; 0: there are none
     double re[SYMDYN_ROOTS][SYMDYN_FACTORS], im[SYMDYN_ROOTS][SYMDYN_FACTORS];
     int order[SYMDYN_ROOTS][SYMDYN_BAND];
 #if SYMDYN_BANDED

@@ -62,6 +62,11 @@ static void symdyn_judge(symdyn_run *run, int failure, double err, double root, 
     // order 8 against h*0.9*err^(-1/8), at equal error: 7 % fewer evaluations for double pendulums, 1 % more for Kepler orbits.
     grow = 0.85 / root * sqrt(sqrt(run->root_old));
     grow = grow > 6.0 ? 6.0 : grow > 0.333 ? grow : 0.333;
+#if SYMDYN_BANDED
+    // While the Jacobian stays, a step that would hardly be longer keeps its length, and with it the factors (Hairer and Wanner,
+    // volume II, section IV.8). Measured: 1.2 times as fast for cables, 1.6 times for nets, whose factors take longer.
+    if (run->method.theta <= 0.01 && grow >= 1.0 && grow <= 1.2) grow = 1.0;
+#endif
     run->h = h * (run->rejected && grow > 1.0 ? 1.0 : grow);
 #if SYMDYN_HAS_INPUTS
     if (!run->rejected && run->h < run->h_cut) run->h = run->h_cut;
