@@ -116,9 +116,10 @@ MEASUREMENTS: dict[str, Measurement] = {
                                         "help": "numbers of bodies (default: 10 to 1000)"}),
             _folder("rolled"))),
     "stiff": Measurement(
-        "symdyn.lab.stiff_cables:run", "stiff cables by sparse and by dense factors; at rest compared with closed forms", (
+        "symdyn.lab.stiff_cables:run",
+        "stiff cables by factors in a band and by SciPy's sparse ones; at rest compared with closed forms", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
-                                        "help": "numbers of links (default: 10, 100, 1000)"}), _JSON)),
+                                        "help": "numbers of links (default: 10, 100, 250, 500, 1000)"}), _JSON)),
     "bridges": Measurement(
         "symdyn.lab.bridges:run", "footbridges of up to 200 bars: growth, accelerations compared with 60 digits, energy", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,

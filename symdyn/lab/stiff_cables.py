@@ -1,12 +1,13 @@
-"""Elastic cables between two supports: stiff motions with sparse and with dense factors, shapes at rest and frequencies compared
-with closed forms."""
+"""Elastic cables between two supports: stiff motions by compiled methods with factors in a band and by SciPy's with sparse ones,
+at equal error; shapes at rest and frequencies compared with closed forms."""
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,17 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
+from symdyn.runtime.integrating.methods import is_compiled
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
     from symdyn.runtime.module import Module
 
-SIZES = (10, 100, 1000)
+SIZES = (10, 100, 250, 500, 1000)
 # A cable of 1 m and 1 kg between supports 1 m apart: weight, stretched by its stiffness EA (N) under the tension T (N) of the
 # straight cable, with dampers of ETA (s) times the stiffness.
 WEIGHT, EA, TENSION, ETA = 9.81, 2.0e4, 200.0, 1e-4
@@ -32,13 +35,17 @@ WEIGHT, EA, TENSION, ETA = 9.81, 2.0e4, 200.0, 1e-4
 TAUT_EA, TAUT = 1.0e7, 4.0e3
 # Their largest relative errors with 1,000 links.
 BOUND = 1e-6
-# Dense factors are measured up to so many links.
-LARGEST_DENSE = 100
-RTOL, DURATION = 1e-6, 0.1
+# Relative tolerances by method; the one that growth is measured at.
+TOLERANCES = {"Radau": (1e-4, 1e-6, 1e-8), "radau5": (1e-4, 1e-6, 1e-8, 1e-10), "radau": (1e-4, 1e-6, 1e-8, 1e-10)}
+OF_GROWTH, DURATION = 1e-6, 0.1
+# Relative tolerance of explicit steps, whose end the others are compared with.
+TIGHT = 1e-11
+# Growth is fitted to cables of so many links and more.
+LEAST_OF_GROWTH = 100
 # Newton's iteration to a shape at rest: it has ended where a step is no longer than this, m, and takes so many steps at most.
 SETTLED, NEWTON_STEPS = 1e-14, 30
-HEADING = (f"{'links':>6}{'states':>8}{'entries':>9}{'derive s':>10}{'method':>9}{'steps':>8}{'Jacobians':>11}{'factors':>9}"
-           f"{'s a second':>12}{'error':>10}")
+HEADING = (f"{'links':>6}{'states':>8}{'entries':>9}{'derive s':>10}{'method':>9}{'rtol':>8}{'steps':>8}{'Jacobians':>11}"
+           f"{'factors':>9}{'MB':>8}{'s a second':>12}{'error':>10}")
 
 
 REST_HEADING = f"{'links':>6}{'sag m':>14}{'off':>10}   frequencies rad/s and off"
@@ -66,23 +73,31 @@ class Rest:
 @dataclass(frozen=True)
 class Row:
     """One cable by one method: entries of the Jacobian that may differ from zero, processor seconds to derive and for each
-    second of motion, steps, Jacobians, factorizations, the error of the end against a tight run, m."""
+    second of motion, steps, Jacobians, factorizations, memory of a run, B (0: unknown), the error of the end, m."""
 
     links: int
     states: int
     entries: int
     derive: float
     method: str
+    rtol: float
     steps: int
     jacobians: int
     factorizations: int
+    memory: int
     seconds: float
     error: float
 
     def __str__(self) -> str:
         """A line under HEADING."""
-        return (f"{self.links:>6}{self.states:>8}{self.entries:>9}{self.derive:>10.1f}{self.method:>9}{self.steps:>8}"
-                f"{self.jacobians:>11}{self.factorizations:>9}{self.seconds:>12.3f}{self.error:>10.1e}")
+        memory = f"{self.memory / 1e6:>8.2f}" if self.memory else f"{'':>8}"
+        return (f"{self.links:>6}{self.states:>8}{self.entries:>9}{self.derive:>10.1f}{self.method:>9}{self.rtol:>8.0e}"
+                f"{self.steps:>8}{self.jacobians:>11}{self.factorizations:>9}{memory}{self.seconds:>12.3f}{self.error:>10.1e}")
+
+    @property
+    def of_a_step(self) -> float:
+        """Processor seconds of a step."""
+        return self.seconds * DURATION / self.steps
 
 
 def elastic_cable(n: int, stiffness: float = EA, tension: float = TENSION, damping: float = ETA) -> System:
@@ -107,22 +122,50 @@ def elastic_cable(n: int, stiffness: float = EA, tension: float = TENSION, dampi
 
 
 def measure(n: int) -> list[Row]:
-    """A cable that is straight at first and falls into its sag: by sparse factors, and by dense ones where these fit."""
+    """A cable that is straight at first and falls into its sag, by every method at every tolerance."""
     begun = clock.process_time()
     module = elastic_cable(n).embedding().compile(backend="c")
     derive = clock.process_time() - begun
     places = module.jacobian_indices()
     assert places is not None
-    exact = module.simulate([0, DURATION], method="Radau", rtol=1e-9).q[-1]
+    exact = module.simulate([0, DURATION], rtol=TIGHT, atol=TIGHT / 100).q[-1]
     rows = []
-    for method in ("Radau", *(["radau5"] if n <= LARGEST_DENSE else [])):
-        module.simulate([0, DURATION / 100], method=method, rtol=RTOL)  # compiles
-        begun = clock.process_time()
-        sol = module.simulate([0, DURATION], method=method, rtol=RTOL)
-        seconds = (clock.process_time() - begun) / DURATION
-        rows.append(Row(n, places.n, len(places.rows), derive, method, sol.n_steps, sol.njev, sol.nlu, seconds,
-                        float(np.abs(sol.q[-1] - exact).max())))
+    for method, tolerances in TOLERANCES.items():
+        module.simulate([0, DURATION / 100], method=method)  # compiles
+        memory = _memory(module, method)
+        for rtol in tolerances:
+            begun = clock.thread_time()  # threads of a BLAS wait for each other, and would count
+            sol = module.simulate([0, DURATION], method=method, rtol=rtol, atol=rtol / 100)
+            seconds = (clock.thread_time() - begun) / DURATION
+            rows.append(Row(n, places.n, len(places.rows), derive, method, rtol, sol.n_steps, sol.njev, sol.nlu, memory, seconds,
+                            float(np.abs(sol.q[-1] - exact).max())))
     return rows
+
+
+def _memory(module: Module, method: str) -> int:
+    """What a run of a compiled method takes, B; 0 for other methods."""
+    if not is_compiled(method):
+        return 0
+    size = module.library(RightSide(method=method)).function("simulation_size")
+    size.restype = ctypes.c_long
+    return int(size())
+
+
+def speedups(rows: Sequence[Row], method: str) -> list[float]:
+    """Of one cable: seconds of the runs of SciPy's Radau over those of a compiled method at the same error, which are
+    interpolated between its runs, and those of its loosest run where this is more exact. Runs of SciPy's that are more exact than
+    all of the other do not count."""
+    own = sorted((row.error, row.seconds) for row in rows if row.method == method)
+    errors, seconds = np.log(own).T
+    return [float(row.seconds / np.exp(np.interp(np.log(row.error), errors, seconds)))
+            for row in rows if row.method == "Radau" and row.error >= own[0][0]]
+
+
+def exponent(rows: Sequence[Row], method: str, of: Callable[[Row], float]) -> float:
+    """The power of the number of links that a quantity of a compiled method grows with, at one tolerance."""
+    own = [(row.links, of(row)) for row in rows
+           if row.method == method and row.links >= LEAST_OF_GROWTH and row.rtol == OF_GROWTH]
+    return float(np.polyfit(*np.log(own).T, 1)[0])
 
 
 # -- at rest
@@ -222,6 +265,15 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
         for row in measure(n):
             rows.append(row)
             print(row, flush=True)
+    for method in filter(is_compiled, TOLERANCES):
+        for n in sizes:
+            found = speedups([row for row in rows if row.links == n], method)
+            if found:
+                print(f"{n:>6} links: at equal error Radau of SciPy takes {min(found):.0f} to {max(found):.0f} times as long as "
+                      f"{method}")
+        if sum(n >= LEAST_OF_GROWTH for n in sizes) > 1:
+            print(f"        {method}: seconds of a step grow with links^{exponent(rows, method, lambda row: row.of_a_step):.2f}, "
+                  f"memory with links^{exponent(rows, method, lambda row: row.memory):.2f}")
     print(REST_HEADING)
     rests = []
     for n in sizes:

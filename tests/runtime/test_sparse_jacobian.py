@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -141,11 +142,28 @@ def test_where_entries_stand_is_looked_for_once(monkeypatch: pytest.MonkeyPatch)
     assert packed.places(another) is packed.places(another) and len(looked) == 2
 
 
+def test_ratios_and_growth_of_measurements() -> None:
+    """Powers are found to the digit; runs are compared at the same error, those that are more exact than all others are left."""
+    def row(links: int, method: str, rtol: float, seconds: float, error: float) -> stiff_cables.Row:
+        return stiff_cables.Row(links, 4 * links, 26 * links, 1.0, method, rtol, 10, 1, 20, 8 * links**2, seconds, error)
+
+    own = [row(100, "radau5", 1e-4, 1.0, 1e-4), row(100, "radau5", 1e-6, 4.0, 1e-8)]
+    scipy = [row(100, "Radau", 1e-4, 30.0, 1e-3), row(100, "Radau", 1e-6, 60.0, 1e-6), row(100, "Radau", 1e-8, 99.0, 1e-9)]
+    assert stiff_cables.speedups([*own, *scipy], "radau5") == pytest.approx([30.0, 30.0])
+    grown = [row(n, "radau5", 1e-6, 1e-3 * n**1.5, 1e-8) for n in (10, 100, 200, 400)]
+    assert stiff_cables.exponent(grown, "radau5", lambda one: one.of_a_step) == pytest.approx(1.5)
+    assert stiff_cables.exponent(grown, "radau5", lambda one: one.memory) == pytest.approx(2.0)
+
+
 @needs_c
 def test_measurement(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "stiff", "--sizes", "10", "--json", str(tmp_path / "found.json")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == stiff_cables.HEADING and [line.split()[4] for line in lines[1:3]] == ["Radau", "radau5"]
-    assert lines[3] == stiff_cables.REST_HEADING and (tmp_path / "found.json").exists()
+    rows = json.loads((tmp_path / "found.json").read_text())["motions"]
+    assert lines[0] == stiff_cables.HEADING and [line.split()[4] for line in lines[1:12]] == [row["method"] for row in rows]
+    assert [row["rtol"] for row in rows] == [rtol for some in stiff_cables.TOLERANCES.values() for rtol in some]
+    # Errors fall with the tolerance, and are those of the motion, which is compared with explicit steps.
+    assert all(row["error"] <= 10 * row["rtol"]**1.1 for row in rows)
+    assert lines[12].startswith("    10 links: at equal error Radau of SciPy takes") and lines[14] == stiff_cables.REST_HEADING
     with pytest.raises(ArgumentError, match=r"10 or more; found 3 20$"):
         stiff_cables.run((3, 20))
