@@ -32,6 +32,7 @@ from symdyn.errors import (
     SimulationInterrupted,
     SimulationWarning,
 )
+from symdyn.lab.stiff_cables import elastic_cable
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.gpu import compiling, device
@@ -159,6 +160,19 @@ def test_implicit_methods_and_series(host: HostDevice, method: str) -> None:
     same(there, module.simulate_batch(**asked, t=[0, 0.2, 0.5], method=method))
     plain = module.simulate_batch(**asked, t=[0, 0.2, 0.5])
     assert host.log and not np.array_equal(there.x, plain.x) and np.abs(there.x - plain.x).max() < 1e-6
+
+
+def test_factors_in_a_band(host: HostDevice) -> None:
+    """Of cables with dampers of different sizes; their tables are code of a GPU, too."""
+    module = elastic_cable(10).embedding().compile(backend="c")
+    asked = {"params": {"d": np.linspace(5.0, 30.0, 3)}, "t": [0, 0.005, 0.01], "method": "radau5"}
+    there = module.simulate_batch(**asked, device="gpu")
+    same(there, module.simulate_batch(**asked))
+    unit: Any = module.library(RightSide(method="radau5", threads=True))
+    assert host.log and "static const int symdyn_sequence[36]" in unit.source
+    pytest.importorskip("cuda.bindings")
+    code, printed = compiling.ptx(unit.source, "cable", "compute_90")
+    assert b".entry elastic_cable_10_motions(" in code and not printed
 
 
 def test_what_has_no_series_goes_on_on_the_processor(host: HostDevice) -> None:
