@@ -10,7 +10,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -146,7 +146,8 @@ def _memory(module: Module, method: str) -> int:
     """What a run of a compiled method takes, B; 0 for other methods."""
     if not is_compiled(method):
         return 0
-    size = module.library(RightSide(method=method)).function("simulation_size")
+    library: Any = module.library(RightSide(method=method))
+    size = library.function("simulation_size")
     size.restype = ctypes.c_long
     return int(size())
 
@@ -165,7 +166,8 @@ def exponent(rows: Sequence[Row], method: str, of: Callable[[Row], float]) -> fl
     """The power of the number of links that a quantity of a compiled method grows with, at one tolerance."""
     own = [(row.links, of(row)) for row in rows
            if row.method == method and row.links >= LEAST_OF_GROWTH and row.rtol == OF_GROWTH]
-    return float(np.polyfit(*np.log(own).T, 1)[0])
+    logarithms = np.log(own)
+    return float(np.polyfit(logarithms[:, 0], logarithms[:, 1], 1)[0])
 
 
 # -- at rest
