@@ -121,6 +121,7 @@ class Dialect:
     zeros        a statement that makes all {n} results zero, before the others of many zeros; None: each is stored
     words        what names in this language must not be, besides the words that no language has as names
     caseless     names that differ in capitals alone are the same
+    reordered    whether statements stand where few values wait for their uses, without the headings of the derivation
     madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
 
@@ -143,6 +144,7 @@ class Dialect:
     read: str | None = None
     words: tuple[str, ...] = ()
     caseless: bool = False
+    reordered: bool = False
 
     def names(self) -> set[str]:
         """The names that are taken before any is given, as `identifier` looks at them."""
@@ -171,7 +173,7 @@ def read_dialect(folder: Path) -> Dialect:
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
-                                          "files", "madd", "zeros", "read", "words", "caseless") if key in table}
+                                          "files", "madd", "zeros", "read", "words", "caseless", "reordered") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
                    parts=Parts(**table["parts"]) if "parts" in table else None,
                    loops=Loops(**table["loops"]) if "loops" in table else None,

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from symdyn.backend.common import Beginning, most_in_common, read_later, saved
 from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
 from symdyn.backend.function import ARGUMENTS, Function, Part
+from symdyn.backend.order import few_waiting
 from symdyn.backend.rolled import Rolled
 from symdyn.backend.writer import Writer, checks_of
 from symdyn.tape.arrays import Arrays
@@ -103,7 +105,7 @@ class Drafts:
         if not self.long(draft):
             writer = Writer(self.dialect, draft.tape, self.places, self.hoisted, self.codes, self.late,
                             self.inlined.get(draft.name))
-            part = writer.part(draft.body, entries, writer.results_of(entries), draft.checks)
+            part = writer.part(self._ordered(draft, draft.body, entries), entries, writer.results_of(entries), draft.checks)
             return made(part.arguments, part.loads, part.sections, part.results, inlined=frozenset(writer.printer.inline))
         beginning = beginning or Beginning()
         parts, _, n_w, inlined = self._parts(draft, beginning, ())
@@ -130,15 +132,20 @@ class Drafts:
         for k, (stretch, kept) in enumerate(stretches, storing - len(stretches)):
             writer = Writer(self.dialect, draft.tape, self.places, stored, self.codes, self.late, wanted)
             if k < 0:
-                part = writer.part(stretch, kept, partial(writer.keep, kept, slots), draft.checks)
+                part = writer.part(self._ordered(draft, stretch, kept), kept, partial(writer.keep, kept, slots), draft.checks)
                 parts.append(replace(part, stores=False))
             else:
                 ends = range(k * longest, min((k + 1) * longest, len(entries))) if storing > 1 else range(len(entries))
                 here = [entries[i] for i in ends]
-                parts.append(writer.part(stretch, here, writer.results_of(entries, ends), draft.checks))
+                ordered = self._ordered(draft, stretch, here)
+                parts.append(writer.part(ordered, here, writer.results_of(entries, ends), draft.checks))
             stored |= {node: ("w", slots[node]) for node in kept}
             result |= writer.printer.inline
         return parts, slots, n_w, frozenset(result)
+
+    def _ordered(self, draft: Draft, steps: Sequence[Node], entries: Sequence[Any]) -> Sequence[Node]:
+        """Steps in the order in which the dialect writes them."""
+        return few_waiting(steps, entries, self.inlined.get(draft.name) or ()) if self.dialect.reordered else steps
 
     def beginnings(self, drafts: Sequence[Draft]) -> dict[str, Beginning]:
         """What long functions without loops begin with: what they have in common with others, if that saves LEAST_COMMON."""

@@ -68,12 +68,13 @@ class Writer:
         before = [n for n in body if n in needed]
         loads = self._read([*before, *at_once])
         sections = self._statements(before) + self._sines_and_cosines(at_once)
-        sections += self._statements([n for n in body if n not in self.text])
+        written = self._reordered if self.dialect.reordered else self._statements
+        sections += written([n for n in body if n not in self.text])
         others = self._read((), entries)
         if others:
             sections.append(Section("the other arguments", tuple(others)))
-        written = results()
-        return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), written)
+        stored = results()
+        return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), stored)
 
     def results_of(self, entries: Sequence[Any], stored: Sequence[int] | None = None) -> Callable[[], tuple[str, ...]]:
         """What stores the entries as result, once their text is known; stored: the indices of those that this part stores."""
@@ -181,6 +182,11 @@ class Writer:
             if lines:
                 sections.append(Section(title, tuple(lines)))
         return sections
+
+    def _reordered(self, body: Sequence[Node]) -> list[Section]:
+        """Statements as they stand in `body`; each has the arguments that are first needed there before it."""
+        lines = [line for node in body for line in (*self._read([node]), *self.step(node))]
+        return [Section("in an order in which few values wait for their uses", tuple(lines))] if lines else []
 
     def step(self, node: Node) -> list[str]:
         """The statements of a step, if it is not written where it is used."""
