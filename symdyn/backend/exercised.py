@@ -7,7 +7,7 @@ reference vector showing it.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -163,27 +163,34 @@ def _valued(tape: Tape) -> set[Node]:
     return result
 
 
-def singular_states(tape: Tape, values: Mapping[str, np.ndarray], n: int) -> Iterator[dict[str, np.ndarray]]:
-    """Points (each value an array (1,)) where a guarded divisor of the tape vanishes: between two where its signs differ.
+def singular_states(tape: Tape, values: Mapping[str, np.ndarray], n: int, known: set[Node]) -> dict[str, np.ndarray]:
+    """Points, each value an array (k,), where a guarded divisor of the tape vanishes: between two where its signs differ.
 
-    Parameters stay those of the first of the two.
+    Parameters stay those of the first of the two. All divisors are looked at together, those that are known are left out.
     """
     rows = Rows(tape, values, n)
     fixed = {leaf.args[1] for leaf in tape.inputs if leaf.mask == PARAMETER}
-    for node in (step for step in rows.checked if step.op == "guard" and isinstance(step.args[0], Node)):
+    divisors, first, second = list[Node](), list[int](), list[int]()
+    for node in (step for step in rows.checked if step.op == "guard" and isinstance(step.args[0], Node) and step not in known):
         divisor = np.broadcast_to(rows.number(node.args[0]), (n,))
         above, below = (np.flatnonzero(side) for side in (divisor > 0, divisor < 0))
-        if not (above.size and below.size):
-            continue
-        i, j = above[:1], below[:1]
-        ends = [{name: v[k] for name, v in values.items()} for k in (i, j)]
-        ends[1] = {name: ends[0][name] if name in fixed else v for name, v in ends[1].items()}
-        alone = Tape.of(tape.recorder, divisor=[node.args[0]])
-        sign = [np.sign(Rows(alone, end, 1).number(node.args[0])) for end in ends]
-        if sign[0] == sign[1]:
-            continue
-        for _ in range(HALVINGS):
-            middle = {name: (ends[0][name] + ends[1][name]) / 2 for name in values}
-            there = np.sign(Rows(alone, middle, 1).number(node.args[0]))
-            ends[0 if there == sign[0] else 1] = middle
-        yield ends[0]
+        if above.size and below.size:
+            divisors.append(node.args[0])
+            first.append(above[0])
+            second.append(below[0])
+    alone, each = Tape.of(tape.recorder, divisors=divisors), np.arange(len(divisors))
+
+    def signs(points: Mapping[str, np.ndarray]) -> np.ndarray:
+        there = Rows(alone, points, len(divisors))
+        return np.array([np.sign(np.broadcast_to(there.number(d), each.shape)[k]) for k, d in enumerate(divisors)])
+
+    one = {name: v[first] for name, v in values.items()}
+    other = {name: one[name] if name in fixed else v[second] for name, v in values.items()}
+    begin = signs(one)
+    between = begin != signs(other)
+    for _ in range(HALVINGS if between.any() else 0):
+        middle = {name: (one[name] + other[name]) / 2 for name in values}
+        same = signs(middle) == begin
+        one = {name: np.where(same, middle[name], v) for name, v in one.items()}
+        other = {name: np.where(same, v, middle[name]) for name, v in other.items()}
+    return {name: v[between] for name, v in one.items()}

@@ -20,6 +20,7 @@ from symdyn.backend.exercised import Rows, deciding, singular_states, statements
 from symdyn.errors import UnsupportedExpression
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape
 
 DIGITS = 30
@@ -233,9 +234,13 @@ class _Search:
             usual = {n: self.defaults.get(n, 1.0) for n in self.groups["p"]}
             rows.append(point | (usual if k % 3 == 2 else _varied(self.stream, usual)))
         points = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        extra = [row for name, (regular, singular) in self.whole.items() if singular is not None
-                 for row in singular_states(regular, points, CANDIDATES)]
-        return {name: np.concatenate([values, *[row[name] for row in extra]]) for name, values in points.items()}
+        known: set[Node] = set()
+        extra = []
+        for regular, singular in self.whole.values():
+            if singular is not None:
+                extra.append(singular_states(regular, points, CANDIDATES, known))
+                known.update(regular.steps)
+        return {name: np.concatenate([values, *[more[name] for more in extra]]) for name, values in points.items()}
 
 
 def result_at(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> ReferenceResult | None:

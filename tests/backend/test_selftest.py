@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.backend.exercised import singular_states
 from symdyn.backend.reference import make_reference
 from symdyn.lab.mutants import Mutant, main, measure, mutants
 from symdyn.pipeline import emit
-from symdyn.tape.node import COORDINATE
+from symdyn.tape.node import COORDINATE, PARAMETER
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
-from symdyn.tape.tape import Tape
+from symdyn.tape.tape import Tape, unsigned
 
 
 def reference(expression: sp.Expr, defaults: dict[str, float] | None = None):
@@ -81,3 +83,18 @@ def test_the_self_test_finds_corruptions():
 def test_the_command_prints_its_counts(capsys):
     assert main(["pendulum", "--backend", "numpy", "--count", "5"]) == 0
     assert "pendulum (numpy): 5 of 5 corruptions found, 0 equivalent, 0 missed" in capsys.readouterr().out
+
+
+def test_points_where_guarded_divisors_vanish_are_found_together():
+    """Roots in closed form: q^2 = a and cos q = 0; parameters stay, divisors that are known or keep their sign are left out."""
+    recorder = Recorder()
+    q, a = recorder.leaf("q", COORDINATE), recorder.leaf("a", PARAMETER)
+    divisors = [q * q - a, recorder.cos(q), q * q + 1]
+    guarded = [unsigned(recorder.guard(d, d * d, f"divisor {k}")) for k, d in enumerate(divisors)]
+    tape = Tape.of(recorder, f=[1 / g for g in guarded])
+    values = {"q": np.array([0.5, 3.0, 2.0]), "a": np.array([2.0, 3.0, 3.0])}
+    found = singular_states(tape, values, 3, set())
+    assert set(found["a"]) <= {2.0, 3.0}
+    np.testing.assert_allclose(found["q"], [np.sqrt(found["a"][0]), np.pi / 2], rtol=1e-15)
+    assert singular_states(tape, values, 3, {guarded[0]})["q"].tolist() == found["q"][1:].tolist()
+    assert singular_states(tape, values, 3, set(guarded))["q"].shape == (0,)

@@ -22,7 +22,7 @@ def symdyn_loose(A, least):
     """Whether a pivot of the symmetric A (n, n) is no more than this part of its entry: nothing holds some direction then.
 
     The pivot that is the largest part of its entry goes first, so that rounding stays small."""
-    n, entries = len(A), symdyn_diagonal(A)
+    n, entries, A = len(A), symdyn_diagonal(A), A.copy()
     loose, waiting = (entries <= 0).any(axis=0), np.ones(entries.shape, dtype=bool)
     parts = 1 / np.where(loose, 1, entries)
     for _ in range(n):
@@ -32,8 +32,11 @@ def symdyn_loose(A, least):
         p = part.argmax(axis=0)[None]
         loose = loose | (np.take_along_axis(part, p, 0)[0] <= least)
         column = np.take_along_axis(A, p[None], 1)[:, 0]
-        A = A - column[:, None] * column / np.where(loose, 1, np.take_along_axis(column, p, 0)[0])
+        pivot = np.where(loose, 1, np.take_along_axis(column, p, 0)[0])
         np.put_along_axis(waiting, p, False, 0)
+        there = np.flatnonzero(symdyn_nonzero(np.where(waiting, column, 0)[:, None]))
+        at, column = np.ix_(there, there), column[there]
+        A[at] = A[at] - column[:, None] * column / pivot
     return loose
 
 
