@@ -11,6 +11,7 @@ import symdyn as sd
 from symdyn.formulation.constraints import sampled
 from symdyn.formulation.constraints.null_space import elimination_order
 from symdyn.formulation.constraints.sampled import Sampled, minimum_degree
+from symdyn.formulation.probes.definite import smallest_eigenvalue
 from symdyn.formulation.probes.dependent_rows import search
 
 
@@ -107,3 +108,36 @@ def test_pivots_follow_markowitz() -> None:
     order = elimination_order(A, A != 0)
     assert order is not None and order[0] == (0, 0)
     assert sorted(row for row, _ in order) == [0, 1, 2] and len({column for _, column in order}) == 3
+
+
+def test_contradictions_are_found_where_independence_is_looked_at_by_sparse_factors(sparse: None) -> None:
+    """Rods of two lengths between the same points; without the second one nothing is wrong."""
+    for lengths, wrong in (((1, 2), True), ((1,), False)):
+        system = sd.System("rods", planar=True)
+        x, y = sd.coordinates("x y")
+        slide = system.add_body("slide", mass=0)
+        system.add_joint(sd.Prismatic("along", system.ground, slide, x, axis=[1, 0]))
+        body = system.add_body("particle", mass=1, inertia=0)
+        system.add_joint(sd.Prismatic("across", slide, body, y, axis=[0, 1]))
+        for k, length in enumerate(lengths):
+            system.close_loop(sd.Rod(f"rod{k}", system.ground, body, length))
+        system.initial = {x: 1, y: 0}
+        if wrong:
+            with pytest.raises(sd.ModelError, match="rod1 contradicts rod0: together they demand"):
+                system.augmented()
+        else:
+            assert len(system.augmented().constraints) == 1
+
+
+def test_the_smallest_eigenvalue_is_found_block_by_block() -> None:
+    stream = np.random.default_rng(8)
+    for sizes in ((1, 1, 1), (4,), (1, 3, 2, 1), (2, 2)):
+        whole = np.zeros((sum(sizes), sum(sizes)))
+        first = 0
+        for n in sizes:
+            A = stream.normal(size=(n, n))
+            whole[first:first + n, first:first + n] = A + A.T
+            first += n
+        order = stream.permutation(len(whole))
+        M = whole[np.ix_(order, order)]
+        np.testing.assert_allclose(smallest_eigenvalue(M), np.linalg.eigvalsh(M)[0], rtol=1e-12)

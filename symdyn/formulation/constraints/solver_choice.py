@@ -16,6 +16,7 @@ from symdyn.formulation.constraints.null_space import elimination_order, least_o
 from symdyn.formulation.constraints.saddle import no_room
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
+from symdyn.formulation.probes.definite import smallest_eigenvalue
 from symdyn.formulation.probes.dependent_rows import Ranks
 from symdyn.formulation.probes.rank import first_dependent
 from symdyn.tape.intrinsics import MASSLESS
@@ -159,7 +160,7 @@ def _pivots(quantities: Constrained, result: Ranks | None, fewest: int | None) -
 def _holds(result: Ranks, kept: list[int]) -> bool:
     """Whether there is mass in every direction that the constraints leave; there is where every direction has mass."""
     least = MASSLESS * max(np.abs(result.mass).max(), 1e-300)
-    if np.linalg.eigvalsh(result.mass)[0] > least:
+    if smallest_eigenvalue(result.mass) > least:
         return True
     free = np.linalg.svd(result.samples[[0]].of_rows(kept).dense()[0])[2][len(kept):].T
     return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ result.mass @ free)[0] > least)

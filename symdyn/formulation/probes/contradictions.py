@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ModelWarning
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.probes.definite import smallest_eigenvalue
 from symdyn.tape.floats import evaluate_rows
 
 STATES = 12
 # Sets of numbers for parameters that a contradiction must outlast.
 TRIALS = 16
 TOLERANCE = 1e-9
+# The square of the smallest singular value of unit rows from which on none of them depends on the others.
+INDEPENDENT = 1e-9
 # Part of the largest inertia up to which there is nothing but rounding.
 NO_MASS = 1e-13
 
@@ -108,10 +112,12 @@ def _draw(equations: Equations, numbers: Mapping[str, float]) -> _Draw | None:
 def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> list[_Conflict]:
     """Rows that are the same combination of others at all states, but for a constant that is not zero."""
     order = sorted(kept, key=lambda k: not holonomic[k])
+    if order and _independent(draw.C_r[:, order]):
+        return []
     gradients = {k: draw.C_r[:, k].ravel() for k in order}
     if order:
         directions = np.array([g / np.linalg.norm(g) for g in gradients.values()])
-        if np.linalg.eigvalsh(directions @ directions.T)[0] > 1e-9:  # no row depends on the others
+        if np.linalg.eigvalsh(directions @ directions.T)[0] > INDEPENDENT:  # no row depends on the others
             return []
     independent: list[int] = []
     result = []
@@ -138,6 +144,15 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
                 result.append(_Conflict(k, others, float(defect[0]), of))
                 break
     return result
+
+
+def _independent(C_r: np.ndarray) -> bool:
+    """Whether many rows (s, m, n) with few entries are found independent by sparse factors at the first state."""
+    first = Sampled.of(C_r[:1])
+    if not first.sparse:
+        return False
+    sizes = np.sqrt((C_r * C_r).sum(axis=(0, 2)))[None]  # as parts of the rows at all states
+    return bool(first.scaled(1 / sizes, np.ones((1, first.n))).smallest()[0]**2 > INDEPENDENT)
 
 
 def _alike(a: _Conflict, b: _Conflict) -> bool:
@@ -184,12 +199,15 @@ def _loose(draw: _Draw) -> set[int] | None:
         inertia = np.abs(np.diag(M))
         largest = max(inertia.max(), 1e-300)
         unit = np.sqrt(np.where(inertia > NO_MASS * largest, inertia, largest))
+        M = M / np.outer(unit, unit)
+        if smallest_eigenvalue(M) > TOLERANCE:  # every motion has mass
+            return None
         Vt = np.linalg.svd(C_r / unit)[2]
         sizes = np.linalg.svd(C_r / unit, compute_uv=False)
         free = Vt[int((sizes > TOLERANCE * sizes.max(initial=0.0)).sum()):].T
         if not free.shape[1]:
             return None
-        values, vectors = np.linalg.eigh(free.T @ (M / np.outer(unit, unit)) @ free)
+        values, vectors = np.linalg.eigh(free.T @ M @ free)
         null = np.abs(values) <= NO_MASS
         if not null.any():
             return None
