@@ -16,6 +16,7 @@ from symdyn.formulation.constraints.null_space import least_operations
 from symdyn.lab import nets
 from symdyn.lab.nets import by_hand, moving, net
 from symdyn.runtime.building.compiler import find_compiler
+from tests.helpers import swept
 
 
 def test_elimination_of_many_freedoms_is_not_derived() -> None:
@@ -73,6 +74,21 @@ def test_accelerations_and_energy() -> None:
     assert np.abs(module.rhs(0, x)[n:] - exact).max() <= 1e-12 * np.abs(exact).max()
     sol = module.simulate((0, 1), q, u, rtol=1e-9)
     assert sol.success and sol.energy_error() <= 1e-8 and np.abs(sol.constraint_violation).max() <= 1e-12
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+@pytest.mark.parametrize("side", [3, *swept([5])])
+def test_rows_of_states_have_the_bits_of_single_states(side: int) -> None:
+    """Statements of like shape, of which one adds and its neighbour subtracts a product: compilers that compute them side by
+    side may round them once, in the code of one state only."""
+    module = net(side, side).augmented().compile()
+    q, u = moving(module)
+    x = np.concatenate([q, u]) + 1e-3 * np.random.default_rng(0).normal(size=(64, 2 * len(q)))
+    assert np.array_equal(module.rhs_batch(0.0, x), [module.rhs(0.0, state) for state in x])
+    velocities = [module.consistent(u=np.random.default_rng(k).normal(size=len(u)))[1] for k in range(8)]
+    many = module.simulate_batch(q, velocities, t=(0, 0.02), rtol=1e-9)
+    alone = [module.simulate((0, 0.02), q, v, rtol=1e-9) for v in velocities]
+    assert np.array_equal(many.x[:, -1], [sol.x[-1] for sol in alone])
 
 
 @pytest.mark.sweep

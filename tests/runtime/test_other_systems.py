@@ -35,7 +35,7 @@ gcc = Compiler(("gcc", "-march=x86-64"), "gcc", "12")
 tcc = Compiler(("tcc",), "tcc", "0.9.28")
 print([SUFFIX, *flags(gcc), *link_flags(gcc)], flags(zig)[-3:], flags(tcc), sep="\\n")
 """
-USUAL = ["-std=c99", "-O3", "-ffp-contract=off"]
+USUAL = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-tree-slp-vectorize"]
 CHOSEN = {
     "linux": ([".so", *USUAL, "-fPIC", "-shared", "-lm", "-Wl,-Bsymbolic-functions"], ["-fPIC", "-shared", "-nostdlib"],
               ["-nostdlib", "-nostdinc", "-shared"]),

@@ -79,7 +79,9 @@ def flags(compiler: Compiler) -> list[str]:
     else:
         zig = compiler.kind == "zig"
         native = ["-mcpu=native"] if zig else ["-march=native"] if _accepts_native(compiler) else []
-        chosen = ["-std=c99", "-O3", *native, "-ffp-contract=off"]
+        # Computing neighbours side by side, gcc fuses products with sums although contraction is off: rounding would depend on
+        # what stands next to a statement.
+        chosen = ["-std=c99", "-O3", *native, "-ffp-contract=off", *["-fno-tree-slp-vectorize"] * (compiler.kind == "gcc")]
         chosen += ["-fno-sanitize=undefined"] if zig else []
         chosen += [*([] if WINDOWS else ["-fPIC"]), "-shared"]
         # Without its own libc to prepare, zig starts in a fraction of a second instead of several.
