@@ -19,6 +19,8 @@ from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.definite import smallest_eigenvalue
 from symdyn.formulation.probes.dependent_rows import Ranks
 from symdyn.formulation.probes.rank import first_dependent
+from symdyn.spatial.vectors import vector
+from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.intrinsics import MASSLESS
 from symdyn.tape.node import is_zero
 from symdyn.tape.tape import Tape
@@ -30,6 +32,9 @@ Pivots = tuple[tuple[int, int], ...]
 CANDIDATES = 8
 # Elimination is not derived where the least that it takes is so many times what another way takes.
 MARGIN = 2
+# Where a way fails at more of the states tried, it is counted with what the numeric algorithm takes there; walks come to folded
+# positions, where ways fail, more often than motions do.
+RARELY = 0.1
 
 
 def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
@@ -76,11 +81,20 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     if not ways:
         notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
         return replace(whole, notes=(*whole.notes, *notes))
-    best = min(counts, key=lambda name: counts[name])
-    others = [f"{name}, {count}" for name, count in counts.items() if name != best] + others
+    numeric = 0 if too_large else operations(quantities)
+    failing = {name: _failing(way, found) for name, way in ways.items()}
+
+    def cost(name: str) -> tuple[float, float]:
+        """Of ways that raise where they fail, the part of the states before the operations."""
+        part = failing[name] if failing[name] > RARELY else 0.0
+        return (part if too_large else 0.0), counts[name] + part * numeric
+
+    best = min(counts, key=cost)
+    others = [f"{name}, {count}{_fails(failing[name])}" for name, count in counts.items() if name != best] + others
     if not too_large:
-        others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
-    notes.append(f"accelerations by {best}: {counts[best]} operations" + (f" ({'; '.join(others)})" if others else ""))
+        others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {numeric}")
+    aside = f" ({'; '.join(others)})" if others else ""
+    notes.append(f"accelerations by {best}: {counts[best]} operations{_fails(failing[best])}{aside}")
     if too_large:
         notes.append(f"where a pivot vanishes evaluations raise: {too_large}")
     chosen = result(ways[best], None if too_large else whole)
@@ -118,6 +132,27 @@ def _remarks(equations: Equations, quantities: Constrained, result: Ranks | None
 def operations(quantities: Constrained) -> int:
     """Operations of one evaluation of the accelerations."""
     return Tape.of(quantities.algebra.recorder, accelerations=quantities.accelerations()).operations
+
+
+def _failing(way: Constrained, found: Ranks | None) -> float:
+    """The part of the states tried at which a pivot of this way is too small, so that the numeric algorithm takes over."""
+    if found is None:
+        return 0.0
+    recorder = way.algebra.recorder
+    steps = Tape.of(recorder, accelerations=way.accelerations()).steps
+    others = Tape.of(recorder, M_tilde=way.recall("M_tilde"), C_r=way.C_r(), bias=way.recall("bias"),
+                     remaining=vector(*way.remaining())).steps
+    checked = (recorder.checks.keys() & set(steps)) - set(others)
+    margins = [node.args[1] if node.op == "guard" else node for node in steps if node in checked]
+    if not margins:
+        return 0.0
+    sizes = evaluate_rows(Tape.of(recorder, margins=vector(*margins)), found.values, len(found.samples))["margins"]
+    return float((~(sizes > 0).all(axis=1)).mean())
+
+
+def _fails(part: float) -> str:
+    """Words on a way that fails at so many of the states tried, where it counts."""
+    return f", fails at {100 * part:.0f} % of the states tried" if part > RARELY else ""
 
 
 def singular(quantities: Constrained) -> bool:

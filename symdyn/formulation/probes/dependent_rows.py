@@ -3,8 +3,9 @@ the initial one, and those that are reached from there by walking along the moti
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Ranks:
 
     samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
     vanishing   rows whose derivatives vanish at all these states, but not next to them
+    values    name -> number, or (s,) at these states
     """
 
     rank: int
@@ -41,6 +43,7 @@ class Ranks:
     samples: Sampled
     mass: np.ndarray
     vanishing: tuple[int, ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 def search(equations: Equations, tries: int = TRIES) -> Ranks | None:
@@ -86,10 +89,12 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     counts = samples.ranks()
     rank = int(counts.max(initial=0))
     samples = samples[counts == rank]
+    values = {**states.values, **dict(zip(states.names, places[counts == rank].T, strict=True))}
     mass = _mass(equations, states, np.concatenate([places, consistent]))
     if mass is None:
         return None
-    return Ranks(rank, _independent(samples, rank, states.holonomic), samples, mass, _vanishing(states, places, stream))
+    return Ranks(rank, _independent(samples, rank, states.holonomic), samples, mass, _vanishing(states, places, stream),
+                 values)
 
 
 def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
