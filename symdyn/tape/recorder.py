@@ -74,8 +74,12 @@ class Recorder:
 
         axes   number the entries x, y, z instead of 1, 2, 3
         """
-        array = np.asarray(value, dtype=object)
-        for node, end in zip(array.ravel().tolist(), _ends(array.shape, axes), strict=True):
+        if isinstance(value, Node):
+            entries, ends = [value], _ends((), axes)
+        else:
+            array = np.asarray(value, dtype=object)
+            entries, ends = array.ravel().tolist(), _ends(array.shape, axes)
+        for node, end in zip(entries, ends, strict=True):
             if isinstance(node, Node) and node.op not in _SELF_EXPLAINING and node not in self.names:
                 self.names[node] = f"{name}{end}"
         return value

@@ -155,11 +155,12 @@ def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
     """Every node that the entries reach, in order of recording."""
     stack = [e for e in entries if isinstance(e, Node)]
     seen: set[Node] = set(stack)
+    pop, push, see = stack.pop, stack.append, seen.add
     while stack:
-        for a in stack.pop().args:
-            if isinstance(a, Node) and a not in seen:
-                seen.add(a)
-                stack.append(a)
+        for a in pop().args:
+            if a not in seen and isinstance(a, Node):
+                see(a)
+                push(a)
     return tuple(sorted(seen, key=attrgetter("index")))
 
 
