@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import symdyn as sd
 from symdyn.backend import source as rendering
@@ -49,12 +50,35 @@ def shuffled(n: int) -> sd.System:
     return system
 
 
+def uneven(n: int) -> sd.System:
+    """A cable whose links in the middle differ: by the symbol of a mass, a number in its place, a joint, and a missing load."""
+    g, m, other, length, stiffness, inertia = sd.parameters("g m m_other l k I")
+    system = sd.System(f"uneven_{n}", gravity=[0, 0, -g])
+    parent = system.ground
+    for i, angles in enumerate(zip(sd.coordinates(f"a1:{n + 1}"), sd.coordinates(f"b1:{n + 1}"), strict=True)):
+        mass = {n // 2: other, n // 2 + 1: sp.Rational(1, 7)}.get(i, m)
+        link = system.add_body(f"link{i + 1}", mass=mass, inertia=[inertia / 100, inertia, inertia], com=[length / 2, 0, 0])
+        at = [length if i else 0, 0, 0]
+        if i == n // 2 + 2:
+            hinge = sd.Revolute(f"joint{i + 1}", parent, link, angles[0], axis=[0, 1, 0], parent_point=at)
+            system.add_joint_force(system.add_joint(hinge), [-stiffness * angles[0]])
+        else:
+            joint = system.add_joint(sd.Universal(f"joint{i + 1}", parent, link, angles, axes=([0, 1, 0], [0, 0, 1]),
+                                                  parent_point=at))
+            if i != n // 2 + 3:
+                system.add_joint_force(joint, [-stiffness * angle for angle in angles])
+        parent = link
+    system.defaults = {g: 9.81, m: 0.1, other: 0.3, length: 0.1, stiffness: 1.0, inertia: 1e-4}
+    return system
+
+
 MADE: dict[str, Callable[[], Equations]] = {
     "pendulum": lambda: sd.systems.get("n_link_pendulum", n=14).recursive(),
     "chain": lambda: sd.systems.get("spatial_chain", n=20).recursive(),
     "cable": lambda: cable(12).recursive(),
     "legs": lambda: legs(6).recursive(),
     "shuffled": lambda: shuffled(16).recursive(),
+    "uneven": lambda: uneven(24).recursive(),
 }
 
 
@@ -102,7 +126,7 @@ def numbers(source: Source, folder: Path, states: int = 20, name: str = "rhs") -
 
 
 @needs_c
-@pytest.mark.parametrize("name", swept(MADE, "cable", "shuffled"))
+@pytest.mark.parametrize("name", swept(MADE, "cable", "shuffled", "uneven"))
 def test_loops_give_the_bits_of_straight_line_code(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     rolled, straight = rolled_and_straight(MADE[name](), monkeypatch)
     function = rolled.program.functions[0]

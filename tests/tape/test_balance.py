@@ -9,6 +9,7 @@ from symdyn.tape import Tape
 from symdyn.tape import node as kinds
 from symdyn.tape.balance import balance
 from symdyn.tape.recorder import Recorder
+from symdyn.tape.tape import unsigned
 from tests import helpers
 
 
@@ -41,6 +42,19 @@ def test_signs() -> None:
     tape = Tape.of(r, y=[-a - b - c - d, a - (b - (c - d)), -(a + b) * c, 1 - (a + b)])
     values = dict(zip("abcd", (2, 3, 5, 7), strict=True))
     assert list(helpers.at(balance(tape), values)["y"]) == [-17, -3, -25, -4] and balance(tape).operations == tape.operations
+
+
+def test_terms_that_cancel_and_numbers_among_terms() -> None:
+    """a and -a are ready at once and leave nothing; numbers keep their sign wherever they stand."""
+    r = Recorder()
+    a, b, c = (r.leaf(name, kinds.COORDINATE) for name in "abc")
+    late = r.sqrt(b)
+    tape = Tape.of(r, y=[(a + late) - a, (c + late) - c - a * a, (-a - c) - late * c, 3 - (a - (b - late)), (c - 5) - (b - a)])
+    ours = balance(tape)
+    values = dict(zip("abc", (2, 9, 7), strict=True))
+    assert list(helpers.at(ours, values)["y"]) == [3, -1, -30, 7, -5]
+    first, second, *_ = ours.outputs["y"].entries
+    assert first is ours.recorder.sqrt(ours.recorder.leaf("b", kinds.COORDINATE)) and first in unsigned(second).args
 
 
 def test_named_checked_and_shared_sums_stay() -> None:
