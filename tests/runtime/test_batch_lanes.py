@@ -18,6 +18,20 @@ pytestmark = pytest.mark.native  # tcc has no vectors
 N = 19  # more than two vectors of eight lanes, and some left over
 
 
+@pytest.mark.parametrize(("name", "method", "message"), [
+    ("four_bar", "euler", "four_bar: there is no method 'euler'; there are dop853, bs54"),
+    ("four_bar", "gauss", "four_bar: method 'gauss' does not fit: it keeps energy by its symmetry"),
+    ("floating_crane", "taylor", "floating_crane: method 'taylor' does not fit")])
+def test_a_method_that_does_not_fit_is_an_error_before_any_motion(monkeypatch: pytest.MonkeyPatch, name: str, method: str,
+                                                                  message: str) -> None:
+    module = sd.systems.get(name).compile(backend="c")
+    monkeypatch.setattr(type(module), "simulate", None)
+    with pytest.raises(sd.ArgumentError, match=message):
+        module.simulate_batch(t=(0, 0.1), method=method)
+    with pytest.raises(sd.ArgumentError, match="'taylor' needs the C backend"):
+        sd.systems.get("pendulum").compile(backend="numpy").simulate_batch(t=(0, 0.1), method="taylor")
+
+
 @pytest.fixture(scope="module")
 def ball() -> Any:
     """A ball that loses a part of its speed at the floor, and stops the motion where it comes up to 1.5 m."""

@@ -31,6 +31,7 @@ from symdyn.runtime.integrating.charts import locked
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import (
+    check_fits,
     checked_method,
     checked_positive,
     checked_spacing,
@@ -91,6 +92,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     starts = side_by_side(groups, n_starts)
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
+    if gpu is None:
+        check_fits(module, options.get("method"), along)
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"), along,
                    wanted(module, events), checked_spacing(module, event_spacing, span), columns)

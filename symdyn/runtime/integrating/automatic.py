@@ -85,7 +85,7 @@ def _fits(module: Module, request: Request, method: str) -> bool:
     if method not in COMPILED:
         return False
     try:
-        check_compiled(module, request, method)
+        check_compiled(module, request.inputs, method)
     except ArgumentError:
         return False
     return True

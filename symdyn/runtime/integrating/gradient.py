@@ -195,7 +195,7 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
     if module.backend != "c":
         raise ArgumentError(f"{module.name}: a gradient was asked for on the backend {module.backend}; the way back is compiled: "
                             "compile(backend='c')")
-    check_compiled(module, request, method)
+    check_compiled(module, request.inputs, method)
     return method
 
 

@@ -137,12 +137,12 @@ def is_compiled(method: object) -> bool:
     return isinstance(method, str) and method in COMPILED
 
 
-def check_compiled(module: Module, request: Request, method: str) -> None:
+def check_compiled(module: Module, inputs: Inputs | None, method: str) -> None:
     """Raises ArgumentError where a compiled method does not fit, with the reason and what to use instead."""
     if module.backend != "c":
         instead = "'Radau'" if method.startswith("radau") else "'DOP853'"
         raise ArgumentError(f"{module.name}: the compiled integrator {shown(method)} needs the C backend; this module "
                             f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
-    why = unfit(module, method, request.inputs)
+    why = unfit(module, method, inputs)
     if why:
         raise ArgumentError(f"{module.name}: method {shown(method)} does not fit: {why}")

@@ -20,7 +20,7 @@ from symdyn.progress import bar as progress_bar
 from symdyn.real_numbers import length_of, number, number_of, real, real_of
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.contact_numbers import check_contact_numbers
-from symdyn.runtime.inputs.inputs import take_inputs
+from symdyn.runtime.inputs.inputs import Inputs, take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating import hybrid
 from symdyn.runtime.integrating.automatic import automatic
@@ -119,7 +119,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())
             method, why = automatic(module, blind, lambda asked, name: _trial(module, asked, name))
         if is_compiled(method):
-            check_compiled(module, request, method)
+            check_compiled(module, request.inputs, method)
         if metadata.contact_groups and method != MOREAU:
             raise ArgumentError(f"{module.name}: contacts of the group {metadata.contact_groups[0].name} are found in steps; "
                                 "pass method='moreau' with a step, such as step=2e-3 (in s)")
@@ -285,6 +285,15 @@ def checked_method(module: Module, method: Any) -> Any:
                         "name, or a class derived from SciPy's")
 
 
+def check_fits(module: Module, method: Any, inputs: Inputs | None) -> None:
+    """Raises ArgumentError for a method that there is not, and for a compiled one that does not fit a module or inputs, None:
+    constants."""
+    if is_compiled(method):
+        check_compiled(module, inputs, method)
+    elif method not in (None, "auto", "ggl", MOREAU):
+        solver_class_of(module, method)
+
+
 def checked_times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Output times, span, whether every step is stored."""
     if t is None:
@@ -311,10 +320,10 @@ def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.
     try:
         relative, vector = number(rtol), np.array(np.broadcast_to(real(absolute), (n,)), order="C")
     except ValueError as error:
-        raise ArgumentError(f"{module.name}: rtol must be a number and atol a number or {n} numbers, found rtol = {shown(rtol)}, "
-                            f"atol = {shown(atol)}: {error}") from None
+        raise ArgumentError(f"{module.name}: rtol must be a number and atol a number or {n} numbers, found {_given(rtol, atol)}: "
+                            f"{error}") from None
     if not (relative >= 0 and (vector >= 0).all() and np.isfinite(vector).all() and (relative > 0 or (vector > 0).all())):
-        raise ArgumentError(f"{module.name}: tolerances must be positive, found rtol = {rtol}, atol = {atol}")
+        raise ArgumentError(f"{module.name}: tolerances must be positive, found {_given(rtol, atol)}")
     if relative > LARGEST_RTOL:
         raise ArgumentError(f"{module.name}: rtol = {rtol} lets the error of a step be nearly as large as the motion itself, "
                             f"which can then grow without end; the largest is {LARGEST_RTOL}, and 1e-3 is loose. For steps of "
@@ -323,6 +332,11 @@ def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.
         raise ArgumentError(f"{module.name}: rtol = {rtol} is finer than double precision can resolve; the smallest is "
                             f"{SMALLEST_RTOL}")
     return max(relative, SMALLEST_RTOL), vector
+
+
+def _given(rtol: Any, atol: Any) -> str:
+    """Tolerances in words; atol None: it is rtol."""
+    return f"rtol = {shown(rtol)}" + ("" if atol is None else f", atol = {shown(atol)}")
 
 
 def checked_positive(module: Module, value: Any, what: str) -> float:
