@@ -35,7 +35,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     from symdyn.ensembles.exports import demand_formats
     from symdyn.ensembles.plan import plan
     from symdyn.ensembles.run import How, StillAtWork, run
-    from symdyn.ensembles.store import RESULT
+    from symdyn.ensembles.store import MANIFEST, RESULT
     from symdyn.ensembles.sweep_file import read_sweep
 
     begun = clock.perf_counter()
@@ -47,6 +47,9 @@ def sweep(arguments: argparse.Namespace) -> int:
         return sweep_on_cluster.show_status(folder, asked.cluster)
     cluster = sweep_on_cluster.with_scheduler(arguments, asked.cluster, faults)
     module = _checked(arguments, asked, faults)
+    if arguments.join and not (folder / MANIFEST).is_file():
+        raise Stop(f"{folder} holds no ensemble: there is nothing to join; start it without --join, or name its folder by "
+                   "--output")
     wanted = plan(module, **asked.arguments(module))
     formats = demand_formats(asked.values.get("formats", ()), module.name)
     if arguments.dry_run:

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from symdyn.cli.messages import Stop
 
+# Whole numbers of the command line are below this one.
+LARGEST = 1e18
+
 
 def pairs(items: Iterable[str], what: str) -> dict[str, str]:
     """name -> text from name=text."""
@@ -40,8 +43,9 @@ def whole(text: str) -> int:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not 1 <= value < 1e18 or value != int(value):
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 on, such as 64 or 1e9, found {text!r}")
+    if not 1 <= value < LARGEST or value != int(value):
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 on, below {LARGEST:g}, such as 64 or 1e9, found "
+                                         f"{text!r}")
     return int(value)
 
 

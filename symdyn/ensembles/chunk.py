@@ -18,6 +18,7 @@ from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, MissingExtra, SimulationWarning, SymdynError
 from symdyn.runtime.batches.motions import IN_LANES, why_columns_one_by_one, why_one_by_one
+from symdyn.runtime.consistent import NotConsistent, advice
 from symdyn.runtime.gpu.device import OfDevice
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import checked_tolerances
@@ -154,7 +155,8 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
             _one_by_one(setting, values, part, done)
             continue
         for place, message in batch.messages.items():
-            done.fail(int(part[place]), MemberFailed(message))
+            own = message.replace(advice(module, float(times[0])), _advice(setting))
+            done.fail(int(part[place]), MemberFailed(own))
         well = np.flatnonzero(batch.success)
         others = [m for m in setting.measures if m.name not in states]
         if any(measure.grad for measure in setting.measures):
@@ -180,6 +182,12 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
             except Exception as error:  # whatever it is, it is this member's
                 _raise_others(error)
                 done.fail(int(part[place]), error)
+
+
+def _advice(setting: Setting) -> str:
+    """What to do about starts that are not consistent."""
+    return "begin each motion with the nearest consistent state: consistent=True, in a sweep file consistent = true" + (
+        "" if setting.device == "cpu" else ", and leave device out")
 
 
 def as_measured(setting: Setting, solution: Solution) -> Solution:
@@ -241,7 +249,10 @@ def motion(setting: Setting, sample: np.ndarray) -> Solution:
     if setting.consistent:
         keep = [n for n, (group, _) in zip(setting.names, setting.places, strict=True) if group in ("q", "u")]
         q, u = module.consistent(q, u, p, float(setting.times[0]), keep)
-    solution = module.simulate(setting.times, q, u, p, z=groups["z"], inputs=groups["inputs"], **setting.options)
+    try:
+        solution = module.simulate(setting.times, q, u, p, z=groups["z"], inputs=groups["inputs"], **setting.options)
+    except NotConsistent as error:
+        raise NotConsistent(error.found, _advice(setting)) from None
     if not solution.success:
         raise MemberFailed(solution.message)
     return solution

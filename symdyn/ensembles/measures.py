@@ -153,6 +153,11 @@ def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure
 def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measure | None:
     if callable(value) and isinstance(label, str):
         return Measure(label, "function", function=value)
+    if callable(value):
+        name = getattr(value, "__name__", "outcome")
+        faults.append(f"outcome {shown(value, 80)}: a function needs a label in the results; pass a mapping such as "
+                      f"{{'{name if name.isidentifier() else 'outcome'}': function}}")
+        return None
     if not isinstance(value, str) or not isinstance(label, str):
         faults.append(f"outcome {shown(label)}: {shown(value, 80)} is neither a text such as 'max q1' nor a function")
         return None

@@ -75,9 +75,13 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
         if (np.abs(residual) > CONSISTENT).any():
             faults.append(f"the initial {what} violate {listed(module, residual, CONSISTENT)} ({unit})")
     if faults:
-        raise NotConsistent(f"{module.name}: {'; '.join(faults)}", "begin with the nearest consistent state: "
-                            f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''}"
-                            f"{', inputs=inputs' if module.metadata.motions else ''})")
+        raise NotConsistent(f"{module.name}: {'; '.join(faults)}", advice(module, t))
+
+
+def advice(module: Module, t: float) -> str:
+    """What to do about a start that is not consistent."""
+    return (f"begin with the nearest consistent state: q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''}"
+            f"{', inputs=inputs' if module.metadata.motions else ''})")
 
 
 def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,

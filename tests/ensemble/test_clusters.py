@@ -168,7 +168,7 @@ def test_which_schedulers_a_file_may_name(address, here, monkeypatch):
 def test_numbers_of_workers_and_samples(tmp_path, capsys, text):
     with pytest.raises(SystemExit):
         main(["sweep", write(tmp_path), "--dry-run", "--count", text])
-    assert "must be a whole number from 1 on, such as 64 or 1e9, found" in capsys.readouterr().err
+    assert f"must be a whole number from 1 on, below 1e+18, such as 64 or 1e9, found '{text}'" in capsys.readouterr().err
 
 
 # -- Slurm
@@ -525,6 +525,15 @@ def test_a_worker_that_joins_leaves_the_rest_to_the_others(tmp_path, capsys):
         os.utime(other._own["00000004"], (0, 0))
         assert main(["sweep", path, "--output", str(out), "--no-picture", "--join", "--stay"]) == 0
         assert "380 of them computed before, 20 in" in capsys.readouterr().out
+
+
+def test_there_is_nothing_to_join_in_a_mistyped_folder(tmp_path, capsys):
+    path, out = write(tmp_path), tmp_path / "out"
+    begun(path, out)
+    assert main(["sweep", path, "--output", str(tmp_path / "typo"), "--join"]) == 2
+    said = capsys.readouterr().err
+    assert "typo holds no ensemble: there is nothing to join; start it without --join, or name its folder by --output" in said
+    assert not (tmp_path / "typo").exists()
 
 
 def begun(path, out):

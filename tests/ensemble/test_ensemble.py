@@ -166,8 +166,20 @@ def test_a_start_is_made_consistent_for_every_member():
     done = sd.ensemble(module, {first: angles}, (0.0, 0.05), {"start": f"start {first}", "error": violation}, consistent=True)
     np.testing.assert_allclose(done["start"], angles, rtol=1e-12)
     assert done["error"].max() < 1e-10
-    with pytest.raises(ArgumentError, match="none of 3 samples that were tried can be simulated"):
+    with pytest.raises(ArgumentError, match=r"none of 3 samples that were tried can be simulated; the first: four_bar: the "
+                                            r"initial positions violate .*; begin each motion with the nearest consistent state: "
+                                            r"consistent=True, in a sweep file consistent = true$"):
         sd.ensemble(module, {first: angle + np.array([0.3, 0.4, 0.5])}, (0.0, 0.05))
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_an_inconsistent_start_is_a_failure_with_what_to_do(monkeypatch, several):
+    module = recall("four_bar", {})
+    first, angle = module.metadata.x[0], module.consistent()[0][0]
+    monkeypatch.setattr(plan, "VECTORS_FROM", 1 if several else 10)
+    done = sd.ensemble(module, {first: [angle, angle + 0.3]}, (0.0, 0.05))
+    assert done.failed.tolist() == [False, True]
+    assert done.failures()[0]["message"].endswith("consistent state: consistent=True, in a sweep file consistent = true")
 
 
 def violation(solution):
@@ -216,11 +228,15 @@ def test_motions_that_stop_early_and_functions_that_raise_are_failures(module):
     ({"q1": [1, 2]}, {"outcomes": ["end q1", "end q1"]}, "the name is taken"),
     ({"q1": [1, 2]}, {"outcomes": ["q1 at 1.2.3"]}, "'1.2.3' is not a time"),
     ({"q1": [1, 2]}, {"outcomes": [3]}, "neither a text"),
+    ({"q1": [1, 2]}, {"outcomes": [farthest]}, "a function needs a label in the results; pass a mapping such as {'farthest': f"),
+    ({"q1": [1, 2]}, {"outcomes": [lambda sol: 1.0]}, "pass a mapping such as {'outcome': function}"),
     ({"q1": [1, 2]}, {"outcomes": ["q1 at 7"]}, "asked for at 7 s, outside of 0 to 0.5 s"),
     ({"q1": [1, 2]}, {"outcomes": ["q1 at 0.3"], "t": np.linspace(0, 1, 3)}, "at 0.3 s, which t does not have"),
     ({"q1": [1, 2]}, {"t": (1, 1)}, "t must be"),
     ({"q1": [1, 2]}, {"t": "long"}, "t must be"),
-    ({"q1": [1, 2]}, {"rtol": -1}, "none of 2 samples that were tried can be simulated; the first: .*tolerances"),
+    ({"q1": [1, 2]}, {"rtol": -1}, "none of 2 samples that were tried can be simulated; the first: "
+     "double_pendulum: tolerances must be positive, found rtol = -1$"),
+    ({"q1": [1, 2]}, {"rtol": 1e-6, "atol": -1}, "tolerances must be positive, found rtol = 1e-06, atol = -1$"),
     ({"q1": [1, 2]}, {"chunk": 0}, "chunk must be a whole number from 1 on"),
     ({"q1": [1, 2]}, {"executor": 3}, "an executor must be"),
     ({"q1": [1, 2]}, {"params": {"m9": 1}}, "there is no 'm9'"),

@@ -325,6 +325,14 @@ def test_what_a_device_lacks_is_not_computed_on_the_processor(host: HostDevice, 
     assert sd.ensemble(module, drawn, (0, 1), device="gpu", path=tmp_path / "a", resume=True).n_failed == 0
 
 
+def test_an_inconsistent_start_is_a_failure_with_what_to_do(host: HostDevice) -> None:
+    module = compiled("four_bar")
+    first, angle = module.metadata.x[0], module.consistent()[0][0]
+    done = sd.ensemble(module, {first: [angle, angle + 0.3]}, (0, 0.05), device="gpu")
+    assert done.failed.tolist() == [False, True]
+    assert done.failures()[0]["message"].endswith("consistent=True, in a sweep file consistent = true, and leave device out")
+
+
 # -- what a device does not take
 
 
