@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import time as clock
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ COUNT = 1_000_000
 # So many motions are integrated on the processor, too: for the time of one, and to be compared with.
 COMPARED = 2_000
 TOLERANCE = 1e-8
+# Threads that an H200 can hold: of each multiprocessor, and their number. For all of them the driver sets stacks aside.
+RESIDENT = 2048 * 132
 # Operations and bytes a second of an H200 by its data sheet, sums and products counted apart, and no tensor units.
 OPERATIONS, BYTES = {"double": 34e12, "single": 67e12}, 4.8e12
 # Evaluations a second that right-hand sides of seven links in space are to reach.
@@ -70,8 +72,10 @@ def _figures(name: str) -> Iterator[Figure]:
     begun = clock.perf_counter()
     compiling.cubin(unit.source, name, ARCHITECTURE)
     yield f"{name}: compiling the kernel, or finding it in the cache", clock.perf_counter() - begun, "s", ""
-    for what, value in _resources(unit.source, name).items():
+    resources = _resources(unit.source, name)
+    for what, value in resources.items():
         yield f"{name}: {what} of a thread, for {ARCHITECTURE}", value, "", ""
+    yield f"{name}: memory of an H200 for stacks", _stacks(resources), "B", ""
     try:
         device.open_device(0, name).close()
     except ArgumentError as error:
@@ -87,6 +91,11 @@ def _resources(text: str, name: str, kernel: str = "motions") -> dict[str, float
     result = {"registers": r"Used (\d+) registers", "bytes of stack": r"(\d+) bytes stack frame",
               "bytes of spilled registers": r"(\d+) bytes spill stores"}
     return {what: float(match[1]) if (match := re.search(pattern, kernel)) else np.nan for what, pattern in result.items()}
+
+
+def _stacks(resources: Mapping[str, float]) -> float:
+    """Bytes of an H200's memory that stacks take."""
+    return resources["bytes of stack"] * RESIDENT
 
 
 def _compared(module: Module, unit: Any, name: str) -> Iterator[Figure]:
@@ -116,8 +125,10 @@ def _rates(name: str, precision: str) -> Iterator[Figure]:
     """What a kernel of right-hand sides takes, what bounds it, and how fast it is with states that lie on the device."""
     module = sd.systems.get(name).compile(backend="c")
     unit: Any = module.library(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
-    for what, value in _resources(unit.source, name, "states").items():
+    resources = _resources(unit.source, name, "states")
+    for what, value in resources.items():
         yield f"{name} rhs, {precision}: {what} of a thread, for {ARCHITECTURE}", value, "", ""
+    yield f"{name} rhs, {precision}: memory of an H200 for stacks", _stacks(resources), "B", ""
     dtype, n_x = np.dtype(PRECISIONS[precision]), module.metadata.sizes.x
     operations, moved = unit.metadata.operations["rhs"], 2 * n_x * dtype.itemsize + 4
     yield f"{name} rhs, {precision}: operations", operations, "", ""

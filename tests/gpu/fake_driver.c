@@ -35,7 +35,8 @@ int cuDevicePrimaryCtxRetain(void **context, int device) { return *context = &n_
 int cuCtxSetCurrent(void *context) { return context == &n_blocks ? OK : INVALID; }
 int cuDeviceGetName(char *name, int length, int device) { return snprintf(name, length, "Fake %d", device), OK; }
 int cuDeviceGetAttribute(int *value, int which, int device) {
-    *value = which == 75 ? 9 : which == 76 ? 0 : which == 16 ? 2 : -1;  // capability 9.0, two multiprocessors
+    // Capability 9.0, two multiprocessors of 2048 threads.
+    *value = which == 75 ? 9 : which == 76 ? 0 : which == 16 ? 2 : which == 39 ? 2048 : -1;
     return device || *value < 0 ? INVALID : OK;
 }
 int cuMemGetInfo_v2(size_t *left, size_t *total) { return *left = *total = (size_t)1 << 28, OK; }
@@ -62,6 +63,9 @@ int cuModuleLoadData(void **module, const void *image) {
 int cuModuleUnload(void *module) { return n_modules--, dlclose(module) ? INVALID : OK; }
 int cuModuleGetFunction(void **function, void *module, const char *name) {
     return *function = dlsym(module, name), *function ? OK : NOT_FOUND;
+}
+int cuFuncGetAttribute(int *value, int which, void *function) {
+    return *value = which == 3 ? 3088 : -1, function && which == 3 ? OK : INVALID;  // bytes of a thread's stack
 }
 int cuOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, void *function, int threads, size_t shared) {
     return *blocks = 2048 / threads, function && !shared ? OK : INVALID;

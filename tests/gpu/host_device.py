@@ -22,7 +22,7 @@ def compiled(name: str) -> Any:
 class HostDevice:
     """Memory are buffers of this process. What a stream is given is done when it is waited for, as late as a GPU may do it.
 
-    memory    bytes that there are; threads: that are held at once
+    memory    bytes that there are; threads: that are held at once; stack: bytes that each of them is said to take
     log       what was done: ("begin", n), ("end", n) of kernels, ("up", bytes), ("down", bytes)
     """
 
@@ -30,7 +30,7 @@ class HostDevice:
     where = (1, 0)
 
     def __init__(self, memory: int = 2**30, threads: int = 256) -> None:
-        self.memory, self.threads = memory, threads
+        self.memory, self.threads, self.stack = memory, threads, 0
         self.blocks: dict[int, Any] = {}
         self.log: list[tuple[str, int]] = []
         self.most = 0
@@ -44,6 +44,9 @@ class HostDevice:
 
     def at_once(self, kernel: Any) -> int:
         return self.threads
+
+    def stacks(self, kernel: Any) -> int:
+        return self.stack * self.threads
 
     def allocate(self, size: int) -> int:
         assert size <= self.free(), "more than the device has"

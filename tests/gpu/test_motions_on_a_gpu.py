@@ -8,6 +8,7 @@ import functools
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -32,6 +33,7 @@ from symdyn.errors import (
     SimulationInterrupted,
     SimulationWarning,
 )
+from symdyn.lab import gpu
 from symdyn.lab.stiff_cables import elastic_cable
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
@@ -84,7 +86,17 @@ def test_memory_of_the_device_is_bounded(host: HostDevice) -> None:
     there = module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
     same(there, module.simulate_batch(**asked, t=np.linspace(0, 1, 11)))
     assert 0.5 * host.memory < host.most <= 0.8 * host.memory
-    host.memory = 3_000
+    # Stacks of threads are of the same memory.
+    host.most, host.stack = 0, 3_000
+    less = module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
+    same(less, there)
+    assert host.most + 8 * host.stack <= 0.8 * host.memory < host.most + 8 * host.stack + 12_000
+    assert less.note.endswith(" of its memory, 24 kB (24000 bytes) of these for stacks of threads") and "stacks" not in there.note
+    host.stack = 6_000
+    with pytest.raises(ArgumentError, match=r"which two motions with 11 output times take .*, 48 kB \(48000 bytes\) of these for "
+                                            r"stacks of threads; ask for fewer output times, or free some"):
+        module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
+    host.memory, host.stack = 3_000, 0
     with pytest.raises(ArgumentError, match=r"a processor has 3 kB \(3000 bytes\) of free memory, of which two motions with 11"):
         module.simulate_batch(**asked, t=np.linspace(0, 1, 11), device="gpu")
 
@@ -333,6 +345,47 @@ def test_an_inconsistent_start_is_a_failure_with_what_to_do(host: HostDevice) ->
     assert done.failures()[0]["message"].endswith("consistent=True, in a sweep file consistent = true, and leave device out")
 
 
+KILLED = """
+import os, signal, sys
+sys.path.insert(0, {here!r})
+from host_device import HostDevice, compiled
+import symdyn as sd
+from symdyn.runtime.gpu import device
+
+class Mortal(HostDevice):
+    launches = 0
+
+    def launch(self, *arguments):
+        Mortal.launches += 1
+        if Mortal.launches == {last}:  # two parts of a chunk are under way
+            os.kill(os.getpid(), signal.SIGKILL)
+        super().launch(*arguments)
+
+device.open_device = lambda number, owner: Mortal(threads=2)
+drawn = sd.Samples({{"q1": {{"from": -1, "to": 1}}}}, count=400, seed=2)
+sd.ensemble(compiled("double_pendulum"), drawn, (0, 1), ["end q1", "max q2"], chunk=50, path={path!r}, device="gpu")
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX")
+@pytest.mark.parametrize("last", [1, 20, 37])
+def test_a_run_that_is_killed_goes_on_to_the_same_file(host: HostDevice, tmp_path: Path, last: int) -> None:
+    module, drawn = compiled("double_pendulum"), sd.Samples({"q1": {"from": -1, "to": 1}}, count=400, seed=2)
+    whole = sd.ensemble(module, drawn, (0, 1), ["end q1", "max q2"], chunk=50, path=tmp_path / "whole", device="gpu")
+    path = tmp_path / "part"
+    done = subprocess.run([sys.executable, "-c", KILLED.format(here=str(HERE), last=last, path=str(path))], check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    there = len(list((path / "chunks").glob("0*.npz")))
+    # A chunk takes seven launches; those that were computed may not have been written yet.
+    assert 0 <= (last - 1) // 7 - there <= 3 and not (path / "ensemble.npz").exists()
+    again = sd.ensemble(module, drawn, (0, 1), ["end q1", "max q2"], path=path, device="gpu:1", resume=True)
+    assert again.n_resumed == 50 * there and again.n_failed == 0
+    assert again.file.read_bytes() == whole.file.read_bytes()
+    here = sd.ensemble(module, drawn, (0, 1), ["end q1", "max q2"])
+    assert np.array_equal(again["max q2"], here["max q2"])
+
+
 # -- what a device does not take
 
 
@@ -415,6 +468,12 @@ def test_the_stack_of_a_kernel_is_bounded() -> None:
     printed = compiling.report(unit.source, "cart_pole", "sm_90")
     found = re.search(r"Used \d+ registers, .* (\d+) bytes cumulative stack size", printed)
     assert found is not None and 1000 < int(found[1]) < 10_000
+    # That which is printed of a thread is what PTX declares, but for what two blocks may share.
+    declared = sum(map(int, re.findall(rb"\.local \.align \d+ \.b8\s+\S+\[(\d+)\]",
+                                       compiling.ptx(unit.source, "cart_pole", "compute_90")[0])))
+    bytes_of_stack = gpu._resources(unit.source, "cart_pole")["bytes of stack"]
+    assert 0.9 * declared < bytes_of_stack == int(found[1]) <= declared
+    assert gpu._stacks({"bytes of stack": bytes_of_stack}) == bytes_of_stack * 132 * 2048
 
 
 def test_a_text_for_devices_evaluates_nothing() -> None:
@@ -459,5 +518,6 @@ except sd.ArgumentError as error:
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
     note, counts, error = done.stdout.splitlines()
     assert note.startswith("on Fake 0, 4096 at once, ") and not done.stderr
+    assert note.endswith(", 12.6 MB (12648448 bytes) of these for stacks of threads")  # 3088 bytes of 4096 threads
     assert counts == "0 0 0 1"  # blocks, modules and streams are given back; one kernel ran
     assert error == "double_pendulum: device='gpu:1' was asked for; there are 1, numbered from 0"

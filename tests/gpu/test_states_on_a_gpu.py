@@ -77,7 +77,10 @@ def test_parts_take_turns_in_a_bounded_memory(host: HostDevice, monkeypatch: pyt
     out = np.empty_like(x)
     assert module.rhs_batch(0.0, x, out=out, device="gpu") is out and np.array_equal(out, module.rhs_batch(0.0, x))
     assert 0.5 * host.memory < host.most <= 0.8 * host.memory
-    host.memory = 2000
+    host.stack, host.most = 1000, 0  # of eight threads
+    assert np.array_equal(module.rhs_batch(0.0, x, device="gpu"), out)
+    assert 0.3 * host.memory < host.most <= 0.8 * host.memory - 8000
+    host.memory, host.stack = 2000, 0
     with pytest.raises(ArgumentError, match=r"a processor has 2 kB \(2000 bytes\) of free memory, of which two states take "):
         module.rhs_batch(0.0, x, device="gpu")
 

@@ -44,6 +44,9 @@ class Device(Protocol):
     def at_once(self, kernel: Any) -> int:
         """How many threads of a kernel the device holds at once."""
 
+    def stacks(self, kernel: Any) -> int:
+        """Bytes of memory that the stacks of a kernel's threads take, while it runs."""
+
     def allocate(self, size: int) -> int:
         """The address of so many bytes of the device."""
 
@@ -114,6 +117,12 @@ class Cuda:
     def at_once(self, kernel: Any) -> int:
         blocks = self._call("cuOccupancyMaxActiveBlocksPerMultiprocessor", kernel, BLOCK, 0)
         return int(blocks) * BLOCK * self.multiprocessors
+
+    def stacks(self, kernel: Any) -> int:
+        # The driver sets them aside for all threads that the multiprocessors could hold of any kernel.
+        threads = self._attribute("MAX_THREADS_PER_MULTIPROCESSOR") * self.multiprocessors
+        which = self.driver.CUfunction_attribute.CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES
+        return int(self._call("cuFuncGetAttribute", which, kernel)) * threads
 
     def allocate(self, size: int) -> int:
         return int(self._call("cuMemAlloc", size))

@@ -110,12 +110,14 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     fixed.append(np.ascontiguousarray(work.look, dtype=np.intc))
     # One row for all is copied once a slot.
     around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
-    free = device.free()
+    free, stacks = device.free(), device.stacks(kernel)
+    around += stacks
     most = (int(SHARE * free) - around) // SLOTS // work.bytes_each()
     if most < 1:
         raise NoDevice(f"{owner}: {device.name} has {in_bytes(free)} of free memory, of which two motions with "
-                            f"{len(work.times)} output times take {in_bytes(SLOTS * work.bytes_each() + around)}; ask for fewer "
-                            "output times")
+                            f"{len(work.times)} output times take {in_bytes(SLOTS * work.bytes_each() + around)}"
+                            f"{f', {in_bytes(stacks)} of these for stacks of threads' * bool(stacks)}; ask for fewer output times"
+                            f"{', or free some' * bool(stacks)}")
     size = max(1, min(n, most, max(ROUNDS * threads, -(-n // (4 * SLOTS)))))
     taken: list[int] = []
 
@@ -137,7 +139,8 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     finally:
         for address in taken:
             device.release(address)
-    return f"on {device.name}, {min(threads, size)} at once, {in_bytes(SLOTS * size * work.bytes_each() + around)} of its memory"
+    return (f"on {device.name}, {min(threads, size)} at once, {in_bytes(SLOTS * size * work.bytes_each() + around)} of its memory"
+            + (f", {in_bytes(stacks)} of these for stacks of threads" if stacks else ""))
 
 
 def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[int], rows: range, threads: int) -> None:

@@ -70,6 +70,11 @@ class _Memory:
             self.device.release(self.taken.pop())
 
 
+def _stacks(device: Device, kernels: Kernels) -> int:
+    """Bytes of the stacks of threads, of the kernel that has the larger ones."""
+    return max(device.stacks(kernel) for kernel in (kernels.constants, kernels.states))
+
+
 def rates(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray, owner: str) -> np.ndarray:
     """Fill xd (n, n_x) from arrays by group, (n, ...) or (1, ...) where nothing varies; returns codes (n,).
 
@@ -79,6 +84,7 @@ def rates(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, np.ndar
     varying = [g for g in GROUPS if len(arrays[g]) > 1]
     each = sum(arrays[g].shape[1] for g in varying) * item + kernels.n_x * item + codes.itemsize
     around = (sum(arrays[g].shape[1] for g in GROUPS) + kernels.n_c) * item * SLOTS + 16 * SLOTS * ALIGNED
+    around += _stacks(device, kernels)
     free = device.free()
     most = (int(SHARE * free) - around) // SLOTS // each
     if most < 1:
@@ -135,6 +141,7 @@ def rates_there(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, n
     codes, size = np.zeros(n, dtype=np.intc), n * kernels.n_x * item
     here = {g: a for g, a in arrays.items() if isinstance(a, np.ndarray)}
     needed = (0 if out is not None else size) + codes.nbytes + sum(a.size * item for a in here.values()) + 16 * ALIGNED
+    needed += _stacks(device, kernels)
     free = device.free()
     if needed > free:
         raise ArgumentError(f"{owner}: {device.name} has {in_bytes(free)} of free memory, and {n} states take "
