@@ -30,11 +30,13 @@ class UserCall:
 
 @dataclass(frozen=True)
 class UserText:
-    """Lines of a text, the functions in it that are called, and names of those in C that nothing calls."""
+    """Lines of a text, the functions in it that are called, names of those in C that nothing calls, and parts of the runtime in C
+    that it calls."""
 
     lines: tuple[str, ...]
     functions: tuple[UserCall, ...]
     spare: tuple[str, ...]
+    parts: tuple[str, ...] = ()
 
 
 def called(tape: Tape) -> tuple[UserFunction, ...]:
@@ -71,7 +73,8 @@ def texts(functions: Sequence[UserFunction], backend: str, name: str) -> list[Us
         calls = [UserCall(f.name, f.numbers.__name__ if backend == "numpy" and f.numbers else f.label, f.signature,
                           len(f.arguments), f.n_out) for f in group]
         spare = [n for n in dict.fromkeys(_DEFINED.findall(text)) if n not in [f.label for f in group]]
-        result.append(UserText(tuple(text.splitlines()), tuple(calls), tuple(spare)))
+        parts = dict.fromkeys(part for f in group for part in f.parts)
+        result.append(UserText(tuple(text.splitlines()), tuple(calls), tuple(spare), tuple(parts)))
     return result
 
 

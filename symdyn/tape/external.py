@@ -23,6 +23,7 @@ class UserFunction(Intrinsic):
 
     label, arguments, results   its name, names of its arguments, number of its results
     texts        pairs of a backend and the text of the function in its language
+    parts        of the runtime in C that its text calls
     derivative   gives the derivatives of the results by the arguments, row by row; None: there are none
     cost         about how many operations it takes
     numbers      computes it for arrays of one shape, one argument each; digits: for an mpmath context and its numbers
@@ -38,6 +39,7 @@ class UserFunction(Intrinsic):
     cost: int
     numbers: Callable[..., Any] | None = field(compare=False)
     digits: Callable[..., Any] | None = field(compare=False)
+    parts: tuple[str, ...] = ()
 
     given = True  # by the user, and not made of what a contact touches
 

@@ -24,7 +24,7 @@ from symdyn.tape.algorithms.states import symdyn_stacked
 from symdyn.tape.external import UserFunction
 from symdyn.tape.node import is_zero
 
-# Degrees of a spline along one variable.
+# Degrees of a spline along one variable, as in symdyn_grid_spline.h.
 HIGHEST = 5
 
 
@@ -111,8 +111,9 @@ def line_spline_of(label: str, spline: Any) -> LineSpline:
     """The function of polynomials piece by piece, such as SciPy's CubicSpline: breaks x, coefficients c."""
     degree = len(spline.c) - 1
     made = LineSpline(
-        name=f"symdyn_call_{label}", label=label, arguments=("x", "order"), results=1, texts=(), derivative=None,
-        cost=10 + 2 * degree, numbers=None, digits=piece_spline, reason=f"the spline {label} is not finite",
+        name=f"symdyn_call_{label}", label=label, parts=("symdyn_line_spline",), arguments=("x", "order"), results=1,
+        texts=(), derivative=None, cost=10 + 2 * degree, numbers=None, digits=piece_spline,
+        reason=f"the spline {label} is not finite",
         knots=(tuple(spline.x.tolist()),), degrees=(degree,), coefficients=tuple(tuple(column) for column in spline.c.T.tolist()))
     return replace(made, texts=(("c", _line_in_c(made)), ("numpy", _line_in_python(made))))
 
@@ -128,8 +129,8 @@ def grid_spline_of(label: str, spline: Any) -> GridSpline | None:
             np.isfinite(t).all() and (np.diff(t) >= 0).all() and t[k] < t[-k - 1] for t, k in zip(knots, degrees, strict=True)):
         return None
     made = GridSpline(
-        name=f"symdyn_call_{label}", label=label, arguments=("x", "y", "order_x", "order_y"), results=1, texts=(),
-        derivative=None, cost=8 * (degrees[0] + 1) * (degrees[1] + 2), numbers=None, digits=grid_spline,
+        name=f"symdyn_call_{label}", label=label, parts=("symdyn_grid_spline",), arguments=("x", "y", "order_x", "order_y"),
+        results=1, texts=(), derivative=None, cost=8 * (degrees[0] + 1) * (degrees[1] + 2), numbers=None, digits=grid_spline,
         reason=f"the spline {label} is not finite",
         knots=(tuple(knots[0].tolist()), tuple(knots[1].tolist())), degrees=(degrees[0], degrees[1]),
         coefficients=tuple(tuple(row) for row in coefficients.tolist()))
@@ -218,30 +219,11 @@ def _line_in_python(spline: LineSpline) -> str:
 def _line_in_c(spline: LineSpline) -> str:
     name, degree, n = spline.label, spline.degrees[0], len(spline.coefficients)
     return "\n".join([
-        *_table(f"{name}_x", spline.knots[0]), *_table(f"{name}_c", [v for row in spline.coefficients for v in row]),
-        f"""
-// A derivative of polynomials piece by piece, from the highest coefficient; beyond the ends those of the ends go on.
-static double {name}_at(double x, int order) {{
-    int low = 0, high = {n};
-    while (high - low > 1) {{
-        const int middle = (low + high)/2;
-        if (x >= {name}_x[middle]) low = middle;
-        else high = middle;
-    }}
-    const double at = x - {name}_x[low];
-    double value = 0;
-    for (int k = 0; k <= {degree} - order; k++) {{
-        double factor = 1;
-        for (int power = {degree} - k - order + 1; power <= {degree} - k; power++) factor *= power;
-        value = value*at + factor*{name}_c[{degree + 1}*low + k];
-    }}
-    return value;
-}}
-
-static int {name}(const double *in, double *out) {{
-    out[0] = {name}_at(in[0], (int)in[1]);
-    return 0;
-}}"""])
+        *_table(f"{name}_x", spline.knots[0]), *_table(f"{name}_c", [v for row in spline.coefficients for v in row]), "",
+        f"static double {name}_at(double x, int order) {{",
+        f"    return symdyn_line_spline({name}_x, {name}_c, {n}, {degree}, x, order);", "}", "",
+        f"static int {name}(const double *in, double *out) {{", f"    out[0] = {name}_at(in[0], (int)in[1]);",
+        "    return 0;", "}"])
 
 
 def _text_in_python(spline: GridSpline) -> str:
@@ -256,53 +238,15 @@ def _text_in_python(spline: GridSpline) -> str:
 
 
 def _text_in_c(spline: GridSpline) -> str:
-    name, (k, other) = spline.label, spline.degrees
-    n_x, n_y = len(spline.coefficients), len(spline.coefficients[0])
-    most = max(spline.degrees) + 1
-    numbers = [v for row in spline.coefficients for v in row]
+    name, shape = spline.label, (len(spline.coefficients), len(spline.coefficients[0]))
+    fields = ", ".join([f"{name}_x", f"{name}_y", f"{name}_c", *map(str, shape), *map(str, spline.degrees)])
     return "\n".join([
-        *_table(f"{name}_x", spline.knots[0]), *_table(f"{name}_y", spline.knots[1]), *_table(f"{name}_c", numbers),
-        f"""
-// Between which knots x lies, the number of the lower one; n: of coefficients.
-static int {name}_place(const double *t, int k, int n, double x) {{
-    int low = k, high = n;
-    while (high - low > 1) {{
-        const int middle = (low + high)/2;
-        if (x >= t[middle]) low = middle;
-        else high = middle;
-    }}
-    return low;
-}}
-
-// The derivative of an order at x, between the knots m and m + 1, from the coefficients m - k to m, which are overwritten.
-static double {name}_line(const double *t, int k, int m, double *c, double x, int order) {{
-    for (int p = 0; p < order; p++) {{
-        for (int j = k; j > p; j--) c[j] = (k - p)*(c[j] - c[j - 1])/(t[m + j - p] - t[m - k + j]);
-    }}
-    for (int r = 1; r <= k - order; r++) {{
-        for (int j = k; j >= order + r; j--) {{
-            const double low = t[m - k + j];
-            c[j] = c[j - 1] + (x - low)/(t[m + j - order - r + 1] - low)*(c[j] - c[j - 1]);
-        }}
-    }}
-    return c[k];
-}}
-
-static double {name}_at(double x, double y, int order_x, int order_y) {{
-    const int m = {name}_place({name}_x, {k}, {n_x}, x), n = {name}_place({name}_y, {other}, {n_y}, y);
-    double lines[{most}];
-    for (int i = 0; i <= {k}; i++) {{
-        double row[{most}];
-        for (int j = 0; j <= {other}; j++) row[j] = {name}_c[(m - {k} + i)*{n_y} + n - {other} + j];
-        lines[i] = {name}_line({name}_y, {other}, n, row, y, order_y);
-    }}
-    return {name}_line({name}_x, {k}, m, lines, x, order_x);
-}}
-
-static int {name}(const double *in, double *out) {{
-    out[0] = {name}_at(in[0], in[1], (int)in[2], (int)in[3]);
-    return 0;
-}}"""])
+        *_table(f"{name}_x", spline.knots[0]), *_table(f"{name}_y", spline.knots[1]),
+        *_table(f"{name}_c", [v for row in spline.coefficients for v in row]), "",
+        f"static double {name}_at(double x, double y, int order_x, int order_y) {{",
+        f"    const symdyn_spline grid = {{{fields}}};", "    return symdyn_grid_spline(&grid, x, y, order_x, order_y);", "}", "",
+        f"static int {name}(const double *in, double *out) {{",
+        f"    out[0] = {name}_at(in[0], in[1], (int)in[2], (int)in[3]);", "    return 0;", "}"])
 
 
 def _table(name: str, numbers: Sequence[float]) -> list[str]:

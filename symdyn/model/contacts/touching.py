@@ -46,6 +46,8 @@ from symdyn.tape.walk import Arithmetic, walk
 
 # A step of Newton's method below this part of the size is the last one of doubles: the next would be below their rounding.
 CLOSE = 1e-9
+# What its text in C calls.
+PART = "symdyn_touching"
 
 
 @dataclass(frozen=True)
@@ -187,10 +189,11 @@ def touching_of(label: str, what: str, implicit: Callable[[Spline | None], Impli
     if spline is not None:
         ours = {backend: f"{text}\n\n{ours[backend]}" for backend, text in spline.texts}
     texts = tuple(sorted(ours.items()))
-    together = None if spline is None else replace(spline, texts=texts)
+    together = None if spline is None else replace(spline, texts=texts, parts=(*spline.parts, PART))
     made = Touching(
         name=f"symdyn_call_{label}", label=label, arguments=tuple(s.name for s in first.known), results=len(first.unknowns),
         texts=texts, derivative=None, cost=300 * len(first.unknowns), numbers=None, digits=touching_point,
+        parts=(PART,) if together is None else together.parts,
         reason=f"{what} touches nowhere, or in several places at once: it is wider than a hollow, or lies flat",
         implicit=implicit(together))
     return made, together
@@ -333,72 +336,14 @@ def _text_in_c(label: str, i: Implicit) -> str:
         head = f"static void {name}(const double *in, const double *s, double *out) {{"
         return [head, *[f"    {line}" for line in body], "}", ""]
 
-    n_k, n_others = n + n * n, len(i.others)
-    equations, called, first, last = "", f"{label}_equations", "", "0"
-    if r.nearest:
-        equations, called = "void (*equations)(const double *, const double *, double *), ", "equations"
-        first, last = f"{label}_equations, ", f"{label}_from({label}_nearest, in, out, size, &value)"
-    step = ("step[0] = -k[0]/k[1];\n        const int positive = k[1] > 0;" if n == 1 else
-            "const double determinant = k[2]*k[5] - k[3]*k[4];\n"
-            "        step[0] = (k[3]*k[1] - k[5]*k[0])/determinant;\n"
-            "        step[1] = (k[4]*k[0] - k[2]*k[1])/determinant;\n"
-            "        const int positive = determinant > 0 && k[2] + k[5] > 0;")
+    nearest = f"{label}_nearest" if r.nearest else "0"
+    functions = ", ".join([*(f"{label}_{name}" for name in ("equations", "others", "size")), nearest])
     return "\n".join([
-        *function(f"{label}_equations", r.equations), *function(f"{label}_others", r.others),
-        *function(f"{label}_size", r.size), *(function(f"{label}_nearest", r.nearest) if r.nearest else []), f"""
-// Newton's method from s, with steps that are halved until the equations are met better; value: of the point that it finds.
-static int {label}_from({equations}const double *in, double *s, double size, double *value) {{
-    double k[{n_k + 1}];
-    {called}(in, s, k);
-    for (int round = 0; round < 50; round++) {{
-        double step[{n}], start[{n}], square = 0, largest = 0, far = 0, part = 1;
-        {step}
-        for (int i = 0; i < {n}; i++) {{
-            largest = fmax(largest, fabs(step[i]));
-            far = fmax(far, fabs(s[i]));
-            square += k[i]*k[i];
-            start[i] = s[i];
-        }}
-        *value = k[{n_k}];
-        if (largest <= {CLOSE!r}*(size + far)) {{
-            for (int i = 0; i < {n}; i++) s[i] += step[i];
-            return !positive;
-        }}
-        for (;;) {{
-            double now = 0;
-            for (int i = 0; i < {n}; i++) s[i] = start[i] + part*step[i];
-            {called}(in, s, k);
-            for (int i = 0; i < {n}; i++) now += k[i]*k[i];
-            if (now <= square*(1 - part/4)) break;
-            part /= 2;
-            if (part < 1e-9) return 1;
-        }}
-    }}
-    return 1;
-}}
-
-static int {label}(const double *in, double *out) {{
-    double size, value = 0, best = 0, others[{(n + 1) * n_others}];
-    for (int i = 0; i < {n}; i++) out[i] = in[i];
-    {label}_size(in, out, &size);
-    int found = !{label}_from({first}in, out, size, &best);
-    for (int i = 0; !found && i < {n}; i++) out[i] = in[i];
-    for (int round = 0; round < 4; round++) {{
-        int lowest = 0;
-        double s[{n}];
-        {label}_others(in, out, others);
-        for (int j = 1; j < {n_others}; j++) {{
-            if (others[{n + 1}*j + {n}] < others[{n + 1}*lowest + {n}]) lowest = j;
-        }}
-        if (found && !(others[{n + 1}*lowest + {n}] < best - 1e-9*size)) return {last};
-        for (int i = 0; i < {n}; i++) s[i] = others[{n + 1}*lowest + i];
-        if ({label}_from({first}in, s, size, &value) || (found && !(value < best))) return 1;
-        for (int i = 0; i < {n}; i++) out[i] = s[i];
-        best = value;
-        found = 1;
-    }}
-    return 1;
-}}"""])
+        *function(f"{label}_equations", r.equations), *function(f"{label}_others", r.others), *function(f"{label}_size", r.size),
+        *(function(f"{label}_nearest", r.nearest) if r.nearest else []),
+        f"static int {label}(const double *in, double *out) {{", f"    double room[{len(r.others)}];",
+        f"    const symdyn_shape shape = {{{n}, {len(i.others)}, {functions}, room, {CLOSE!r}}};",
+        "    return symdyn_touching(&shape, in, out);", "}"])
 
 
 def _text_in_python(label: str, i: Implicit) -> str:
