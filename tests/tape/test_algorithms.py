@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
-import subprocess
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from symdyn.backend.source import Content, render
-from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.catenary import Catenary
 from symdyn.tape.cube import Cube
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.intrinsics import LOOSE, SMOOTHED, Intrinsic, Multipliers, Saddle
 from symdyn.tape.node import INPUT
-from tests.backend.c_warnings import RUNTIME
+from tests.c_rows import needs_c, rows_in_c
 
 INPUTS = 10_000
 SIZES = ((1, 1), (2, 1), (3, 2), (4, 4), (6, 3), (9, 12))
 EACH = INPUTS // len(SIZES) + 1
-
-needs_c = pytest.mark.skipif(find_compiler() is None or require_compiler().kind not in ("gcc", "clang"),
-                             reason="no compiler that takes these options")
 
 
 # -- inputs
@@ -138,19 +131,8 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
             numbers |= {f"{name}_N": sizes[0], f"{name}_M": sizes[1], f"{name}_ONE_SIZE": 0}
         head = "".join(f"#define SYMDYN_{name} {value!r}\n" for name, value in numbers.items())
         given = "".join(f"{size}, " for size in intrinsic.sizes)
-        (folder / "main.c").write_text(
-            f'{head}#define SYMDYN_LINKED static\n#include "{intrinsic.name}.h"\n'
-            f"void run(int n, const double *in, double *out, int *codes) {{\n"
-            f"    for (int k = 0; k < n; k++)\n"
-            f"        codes[k] = {intrinsic.name}({given}in + k * {values.shape[1]}, out + k * {intrinsic.n_out});\n}}\n")
-        command = [*require_compiler().command, "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", f"-I{RUNTIME}",
-                   "-o", folder / "main.so", folder / "main.c", "-lm"]
-        subprocess.run(command, check=True, capture_output=True)
-        out, codes = np.full((len(values), intrinsic.n_out), np.nan), np.zeros(len(values), dtype=np.intc)
-        library = ctypes.CDLL(str(Path(folder / "main.so")))
-        pointers = [np.ascontiguousarray(a).ctypes.data_as(ctypes.c_void_p) for a in (values, out, codes)]
-        library.run(len(values), *pointers)
-        return out, codes != 0
+        text = f'{head}#define SYMDYN_LINKED static\n#include "{intrinsic.name}.h"'
+        return rows_in_c(folder, text, f"{intrinsic.name}({given}", values.shape[1], intrinsic.n_out)(values)
 
     return run
 
