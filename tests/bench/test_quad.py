@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 from fractions import Fraction
+from functools import partial
 
 import mpmath
 import numpy as np
@@ -102,6 +103,36 @@ def test_midpoint_rule_is_that_of_the_field():
     begin = precise("rhs", t, x)
     expected = midpoint(lambda t, x: precise("rhs", t, x), t, x, begin, h, 6)
     assert relative(precise.rule()(t, x, begin, h, 6), expected) <= 8 * ROUNDING
+
+
+@needs_quad
+def test_midpoint_rule_has_the_bits_of_that_in_python(context):
+    """x_dot = v, v_dot = t v - x/(x + 1) where x + 1 > 0, at 10,000 states, some of which it leaves."""
+    r = Recorder()
+    t, x, v = (r.leaf(name, COORDINATE) for name in "txv")
+    apart = x + 1
+    tape = Tape.of(r, rhs=np.array([v, t * v - r.apply("guard", x / apart, apart)], dtype=object))
+    ours, theirs = (module.program(tape, context, {}, ["t", "x", "v"]) for module in (quad, precise))
+    stream, lost = np.random.default_rng(5), 0
+    for k, row in enumerate((stream.normal(size=(10_000, 4)) * [1, 2, 1, 0.3]).tolist()):
+        t0, h, state = context.mpf(row[0]) / 3, context.mpf(row[3]) / 7, [context.mpf(v) / 3 for v in row[1:3]]
+        if k % 50 == 0:
+            state[0] = context.mpf(-1)
+        field = partial(_field, theirs)
+        arguments = t0, state, [context.mpf(v) / 7 for v in row[1:3]], h, 1 + k % 4
+        try:
+            expected = midpoint(field, *arguments)
+        except (precise.Lost, ZeroDivisionError):
+            lost += 1
+            with pytest.raises((precise.Lost, EvaluationError)):
+                ours.midpoint(*arguments)
+            continue
+        assert ours.midpoint(*arguments) == expected
+    assert 100 < lost < 5000
+
+
+def _field(rhs, t, x):
+    return rhs([t, *x])
 
 
 @needs_quad
