@@ -179,7 +179,7 @@ def test_generate_takes_backends_functions_templates_and_a_folder(here: Path, ca
     text = (own / "dialect.toml").read_text(encoding="utf-8")
     own.joinpath("dialect.toml").write_text(re.sub(r"\[files\].*?\n\n", '[files]\n"t.jinja" = "{name}.txt"\n\n', text,
                                                    flags=re.S), encoding="utf-8")
-    own.joinpath("t.jinja").write_text("I am {{ name }}\n", encoding="utf-8")
+    own.joinpath("t.jinja").write_text("I am {{ model.name }}\n", encoding="utf-8")
     assert main(["generate", "pendulum", "--backend", "numpy", "--backend", "words", "--templates", "own", "--functions",
                  "rhs", "--output", "out"]) == 0
     assert {p.name for p in (here / "out").iterdir()} == {"pendulum.py", "pendulum.txt"}

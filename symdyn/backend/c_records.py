@@ -12,7 +12,7 @@ from symdyn.folders import templates_folder
 
 _NUMBERS: dict[str, Any] = {"double": ctypes.c_double, "int": ctypes.c_int, "long": ctypes.c_long, "symdyn_time": ctypes.c_double}
 _RESULTS: dict[str, Any] = {**_NUMBERS, "void": None}
-_RECORD = re.compile(r"typedef struct \{(?P<body>.*?)\} (?P<name>[\w{} ]+);", re.DOTALL)
+_RECORD = re.compile(r"typedef struct \{(?P<body>.*?)\} (?P<name>[\w{}. ]+);", re.DOTALL)
 _FUNCTION = re.compile(r"(?P<result>\w+) \(\*(?P<name>\w+)\)\((?P<arguments>[^)]*)\)")
 _MEMBERS = re.compile(r"(?:const )?(?P<kind>\w+) (?P<names>[\w*, ]+)")
 _CODE = re.compile(r"SYMDYN_(\w+) = (-?\d+)")

@@ -85,10 +85,10 @@ class Function:
         return True
 
     @property
-    def ways(self) -> list[Function]:
+    def with_called(self) -> list[Function]:
         """This function and those that it calls."""
         called = [way for way in (self.regular, self.singular_fallback, self.values) if way is not None]
-        return [self, *[inner for way in (*called, *[a.function for a in self.along]) for inner in way.ways]]
+        return [self, *[inner for way in (*called, *[a.function for a in self.along]) for inner in way.with_called]]
 
     @property
     def size(self) -> int:
@@ -97,6 +97,57 @@ class Function:
         for k in self.shape:
             total *= k
         return total
+
+    @property
+    def room(self) -> int:
+        """Length of an array for the result: C has none of length 0."""
+        return max(self.size, 1)
+
+    @property
+    def room_w(self) -> int:
+        """The same for what parts hand on."""
+        return max(self.n_w, 1)
+
+    @property
+    def shape_text(self) -> str:
+        """The shape of the result in words."""
+        return {0: "one number", 1: f"{self.size} numbers"}.get(
+            len(self.shape), " x ".join(map(str, self.shape)) + ", row by row")
+
+    @property
+    def n_columns(self) -> int:
+        """Of a matrix, whose last axis these are."""
+        return self.shape[-1]
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of such columns."""
+        return self.size // self.n_columns
+
+    @property
+    def leaves_columns(self) -> bool:
+        """Whether columns of it are along no direction: they are zero."""
+        return sum(a.n for a in self.along) < self.n_columns
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it writes nothing to its result."""
+        return not (self.results or self.parts or self.singular_fallback or self.along)
+
+    @property
+    def reads_state(self) -> bool:
+        """Whether it reads part of x."""
+        return not {"q", "u", "z"}.isdisjoint(self.arguments)
+
+    @property
+    def ways(self) -> tuple[Function, ...]:
+        """The functions that hold its statements: itself, or both ways where it is tried in one way first."""
+        return tuple(f for f in (self.regular, self.singular_fallback) if f is not None) or (self,)
+
+    @property
+    def stretches(self) -> tuple[Part | Function, ...]:
+        """Its parts, or itself where it is not divided."""
+        return self.parts or (self,)
 
     @property
     def count(self) -> int:
@@ -125,6 +176,7 @@ class Motion:
 
     n_x      entries of a column; n: columns
     values   where x_dot begins in what the directions share
+    first    where the columns begin in z
     held     number of inputs that are held, whose derivatives along the columns begin at parameter held_first
     by       for each column the entry of the direction that is 1; -1: none
     """
@@ -132,6 +184,12 @@ class Motion:
     n_x: int
     n: int
     values: int
+    first: int
     held: int
     held_first: int
     by: tuple[int, ...]
+
+    @property
+    def by_first(self) -> int:
+        """Where what columns are by begins in the direction."""
+        return self.n_x + self.held

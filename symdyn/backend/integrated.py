@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from symdyn.backend.band import Band
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import Method
 
@@ -23,7 +23,7 @@ OF_CARRYING = ("carried_columns",)
 OF_BOUNDS = ("event_ranges", "event_bounds")
 # Events that wait until they are taken are rows of which, time, state before, state after.
 _NOTE = 2
-# Most of them, besides three of each kind.
+# Most of them, with three more of each kind.
 _WAITING = 64
 
 
@@ -84,6 +84,11 @@ class Shape:
         return [index for event in self.events for index in event.reset]
 
     @property
+    def most_events(self) -> int:
+        """How many events may wait until they are taken."""
+        return _WAITING + 3 * len(self.events)
+
+    @property
     def held(self) -> list[int]:
         """The entries of [q; u] that events reset and that stay when constraints are met, in order."""
         middle = self.sizes["q"] + self.sizes["u"]
@@ -106,7 +111,7 @@ def functions(needs: Sequence[str], arguments_of: Mapping[str, Sequence[str]], c
     return at + [Integrated(f"{name}_of", name, call(name, "out"), False, True) for name in OF_BOUNDS if name in arguments_of]
 
 
-def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tuple[str, int]]:
+def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, int]]:
     """Macros of the sizes that the parts read, and of switches that they read as numbers.
 
     gathered   what the method's template gets besides
@@ -116,8 +121,8 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
               ("SYMDYN_SLOPE_AT_END", int(method.slope_at_end))]
     if method.tableau is not None:
         result.append(("SYMDYN_SECOND_ERROR", int(method.tableau.second is not None)))
-    if "second_order" in gathered:
-        result.append(("SYMDYN_SECOND_ORDER", int(gathered["second_order"])))
+    if gathered.second_order is not None:
+        result.append(("SYMDYN_SECOND_ORDER", int(gathered.second_order)))
     if shape.columns:
         result.append(("SYMDYN_COLUMNS", shape.columns))
     if shape.carried is not None:
@@ -128,14 +133,14 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
     if shape.columns or method.template == "radau":
         result.append(("SYMDYN_STATE", state))
     if method.template == "radau":
-        result += _of_matrices(state, gathered.get("band"))
+        result += _of_matrices(state, gathered.band)
     if shape.n_rows:
         result.append(("SYMDYN_ROWS", shape.n_rows))
     if shape.unit_groups:
         result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
     if shape.events:
         result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_NOTE", _NOTE + 2 * shape.n_x),
-                   ("SYMDYN_NOTES", _WAITING + 3 * len(shape.events) + 1)]
+                   ("SYMDYN_NOTES", shape.most_events + 1)]
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))
@@ -150,7 +155,7 @@ def _of_matrices(state: int, band: Band | None) -> list[tuple[str, int]]:
             ("SYMDYN_REDUCED", band.reduced), ("SYMDYN_LOWER", band.lower), ("SYMDYN_UPPER", band.upper)]
 
 
-def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads: bool, single: bool = False) -> dict[str, bool]:
+def switches(method: Method, shape: Shape, gathered: Gathered, threads: bool, single: bool = False) -> dict[str, bool]:
     """Macros by which parts are left out.
 
     gathered   what the method's template gets besides
@@ -159,13 +164,13 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any], threads:
     """
     tableau = method.tableau
     return {"SYMDYN_EXPLICIT": tableau is not None, "SYMDYN_RADAU": method.template == "radau",
-            "SYMDYN_BANDED": gathered.get("band") is not None,
+            "SYMDYN_BANDED": gathered.band is not None,
             "SYMDYN_GAUSS": method.template == "gauss", "SYMDYN_TAYLOR": method.template == "taylor",
             "SYMDYN_OWN_STEP": method.own_step, "SYMDYN_SLOPE_AT_END": method.slope_at_end,
             "SYMDYN_ORDER_8": method.order == 8,
             "SYMDYN_SECOND_ERROR": tableau is not None and tableau.second is not None,
             "SYMDYN_DENSE_STAGES": tableau is not None and bool(tableau.dense_stages),
-            "SYMDYN_SECOND_ORDER": bool(gathered.get("second_order")), "SYMDYN_UNROLLED": gathered.get("n_lanes") == 1,
+            "SYMDYN_SECOND_ORDER": bool(gathered.second_order), "SYMDYN_UNROLLED": gathered.unrolled,
             "SYMDYN_CROSSES": method.crosses and shape.projects, "SYMDYN_PROJECTS": shape.projects,
             "SYMDYN_SENSITIVE": shape.columns > 0, "SYMDYN_BACKWARD": shape.carried is not None,
             "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0, "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),

@@ -57,6 +57,25 @@ class Program:
     one_size: frozenset[str] = frozenset()
     common: tuple[Function, ...] = ()
 
+    @property
+    def room_c(self) -> int:
+        """Length of an array for the constants: C has none of length 0."""
+        return max(self.n_c, 1)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the functions, in order."""
+        return tuple(f.name for f in self.functions)
+
+    def named(self, name: str) -> Function:
+        """The function of a name."""
+        return next(f for f in self.functions if f.name == name)
+
+    @property
+    def has_fallbacks(self) -> bool:
+        """Whether a function is done in another way where the first one stops."""
+        return any(f.singular_fallback is not None for f in self.functions)
+
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
           reasons: Sequence[str] = (), singular_fallback: Mapping[str, Tape] | None = None, like: Program | None = None,
@@ -83,7 +102,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     used |= arrays.marked(unsigned(e) for o in whole.outputs.values() for e in o.entries)
     constants = {node: k for k, node in enumerate(n for n in arrays.chosen(used & arrays.prologue) if n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    inlined = {w.name: w.inlined for f in (*like.functions, *like.common) for w in f.ways} if like else {}
+    inlined = {w.name: w.inlined for f in (*like.functions, *like.common) for w in f.with_called} if like else {}
     drafts = Drafts(dialect, places, hoisted, codes, late, inlined)
     vectored = [name for name in tapes if name in columns] if vectors is not None else []
     ways = {f"{name}_{REGULAR}" if name in singular_fallback else name: (name, tape) for name, tape in tapes.items()
@@ -199,9 +218,9 @@ def _columns(columns: Columns, name: str, title: str, drafts: Drafts, vectors: D
     operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
     motion = None
     if isinstance(columns, MotionColumns):
-        n_p = sum(group == "p" for group, _ in places.values())
-        motion = Motion(columns.n_rows, columns.n, len(shared), columns.held, n_p - columns.n * columns.held,
-                        tuple(-1 if k is None else k for k in columns.by))
+        n_z, n_p = (sum(group == wanted for group, _ in places.values()) for wanted in ("z", "p"))
+        motion = Motion(columns.n_rows, columns.n, len(shared), n_z - columns.n * columns.n_rows, columns.held,
+                        n_p - columns.n * columns.held, tuple(-1 if k is None else k for k in columns.by))
         groups |= {"z", *["p"] * bool(columns.held)}
     return Function(name, title, columns.result_shape, tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
                     (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along), motion=motion)

@@ -58,6 +58,25 @@ class Sample:
     arrays: tuple[tuple[str, tuple[str, ...]], ...]
     results: tuple[ReferenceResult, ...]
 
+    @property
+    def calls(self) -> tuple[ReferenceResult, ...]:
+        """The results that are not empty."""
+        return tuple(r for r in self.results if r.size)
+
+    @property
+    def reads_t(self) -> bool:
+        """Whether a call of these reads the time."""
+        return "t" in self._read
+
+    @property
+    def read(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """The arrays that these calls read."""
+        return tuple((group, values) for group, values in self.arrays if group in self._read)
+
+    @property
+    def _read(self) -> set[str]:
+        return {argument for result in self.calls for argument in result.call.split(", ")}
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -72,6 +91,11 @@ class Reference:
     exercised: int = 0
     checks: int = 0
     idle: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def digits(self) -> int:
+        """Decimal digits that the results are computed with."""
+        return DIGITS
 
     @property
     def coverage(self) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from symdyn.backend.dialect import Dialect
+from symdyn.backend.function import Function
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.program import Program, build
 from symdyn.errors import UnsupportedExpression
 from symdyn.tape.balance import balance
@@ -24,8 +27,36 @@ FEW_SUMS = 2
 ORDERS = 30
 
 
-def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
-    """What the template of the method needs: the functions of the series, their program and their sizes.
+@dataclass(frozen=True, kw_only=True)
+class Series(Gathered):
+    """What the template of the method gets.
+
+    program   of the functions: order 0, which hands on n_0 numbers, and any other order
+    n_sums    sums, which are done in blocks of n_block, on vectors of n_lanes
+    row       numbers that an order takes
+    """
+
+    program: Program
+    n_0: int
+    n_sums: int
+    n_block: int
+    n_lanes: int
+    row: int
+    orders: int = ORDERS
+
+    @property
+    def start(self) -> Function:
+        """The function of order 0."""
+        return self.program.functions[0]
+
+    @property
+    def next(self) -> Function:
+        """The function of any other order."""
+        return self.program.functions[1]
+
+
+def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> Series:
+    """The functions of the series of a right-hand side.
 
     Raises UnsupportedExpression where the right-hand side has no Taylor series.
     """
@@ -45,12 +76,9 @@ def gather_series(content: Content, program: Program, dialect: Dialect, places: 
     whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": factors}))
     tapes = {name: whole.prune((name,)) for name in ("series_start", "series_next")}
     written = build(dialect, tapes, {name: name for name in tapes}, {**places, **made.places}, program.reasons)
-    start, following = written.functions
-    stretches = [part for f in (start, following) for part in (f.parts or (f,))]
-    uses = {"uses_parts": bool(start.parts or following.parts), "uses_sincos": "symdyn_sincos(" in repr(stretches)}
+    stretches = [part for f in written.functions for part in f.stretches]
     n_sums = made.n_s + len(zeros)
     # An odd number of cache lines, so that rows do not compete for the same places of the cache.
     row = 2 * n_sums + made.n_x if n_lanes == 1 else (2 * n_sums + made.n_x + 7) // 16 * 16 + 8
-    return {"series": written, "series_sizes": {"orders": ORDERS, "row": row}, "series_start": start,
-            "series_next": following, "n_0": made.n_0,
-            "n_sums": n_sums, "n_block": n_block, "n_lanes": n_lanes, **{k: v for k, v in uses.items() if v}}
+    return Series(program=written, n_0=made.n_0, n_sums=n_sums, n_block=n_block, n_lanes=n_lanes, row=row, unrolled=n_lanes == 1,
+                  sincos="symdyn_sincos(" in repr(stretches))

@@ -2,34 +2,46 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import hashlib
 import os
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import jinja2
 import numpy as np
 
 import symdyn
-from symdyn import panels
 from symdyn.backend.band import Band
 from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.columns import Columns
+from symdyn.backend.context import (
+    Algorithms,
+    Calls,
+    Context,
+    Corrections,
+    Integrator,
+    Manifold,
+    Model,
+    Needs,
+    Options,
+    Row,
+    call_of,
+)
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
-from symdyn.backend.function import Function, Part
+from symdyn.backend.function import Function
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.integrated import Shape, functions, switches
 from symdyn.backend.integrated import sizes as runtime_sizes
 from symdyn.backend.metadata import EventRecord, Metadata
 from symdyn.backend.methods import Method, method_of, needs_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
-from symdyn.backend.reference import DIGITS, make_reference
+from symdyn.backend.reference import Reference, make_reference
 from symdyn.backend.single import in_single
 from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
@@ -45,9 +57,6 @@ from symdyn.turning import is_angle, turns
 if TYPE_CHECKING:
     from symdyn.given import Rolling
 
-_C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
-           "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c",
-           "v": "const double *v", "change": "const symdyn_vector *change"}
 # What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
@@ -171,21 +180,22 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         lanes = on_vectors() if batch and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
     integrator = integrator and "rhs" in content.tapes
-    context = _context(content, program, dialect, standalone, integrator, lanes, many, method, 0 if only else states)
-    context["threads"], context["single"] = threads, single
     if single:
         _check_single(content.name, program)
-    gather = method_of(method).gather
-    gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
-    context |= gathered
-    context |= _runtime(environment, backend, content, context, method_of(method), gathered)
+    record = method_of(method)
+    asks = integrator and backend == "c" and record.gather is not None
+    gathered = record.gather(content, program, dialect, places) if asks and record.gather is not None else Gathered()
+    # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
+    divides = backend == "c" and integrator and not standalone and lanes is None and not threads and record.template != "taylor"
+    context = _context(content, program, dialect, Options(standalone, threads, divides), _reader(environment), record, gathered,
+                       integrator, lanes, many, single, 0 if only else states)
     files = {}
     wanted = dialect.files or {}
     if only or not standalone:
         wanted = {template: wanted[template] for template in only or list(wanted)[:1]}
     for template, target in wanted.items():
         try:
-            text = environment.get_template(f"{backend}/{template}").render(context)
+            text = environment.get_template(f"{backend}/{template}").render(context.names())
         except jinja2.TemplateNotFound as error:
             algorithm = Path(str(error.name)).name.partition(".")[0]
             if algorithm not in _TEXTS:
@@ -196,10 +206,10 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         except (jinja2.TemplateError, TypeError, ValueError, LookupError, AttributeError) as error:
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         if backend == "c":
-            text = divided(text) if context["divided"] else whole(text)
+            text = divided(text) if divides else whole(text)
             text = in_single(text) if single else text
-        files[target.format(name=context["name"])] = text
-    return Source(backend, files, program, context["metadata_record"])
+        files[target.format(name=context.model.name)] = text
+    return Source(backend, files, program, context.model.metadata)
 
 
 def _check_single(name: str, program: Program) -> None:
@@ -216,28 +226,13 @@ def _environment(*folders: Path) -> jinja2.Environment:
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
 
 
-def _runtime(environment: jinja2.Environment, backend: str, content: Content, context: Mapping[str, Any], method: Method,
-             gathered: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of the runtime in C, and what they are given of the mechanism."""
+def _reader(environment: jinja2.Environment) -> Callable[[str], str]:
+    """What reads the parts of the runtime in C."""
     def read(name: str) -> str:
         assert environment.loader is not None
         return environment.loader.get_source(environment, f"c/runtime/{name}")[0]
 
-    groups = ("q", "u", "z", "inputs")
-    n_rows = context["projection"]["n_rows"] if context["projection"] else 0
-    shape = Shape({g: len(content.groups[g]) for g in groups}, n_rows, context["unit_groups"],
-                  content.events if context["has_events"] else (), content.event_leaves if context["has_events"] else (),
-                  "reset_directions" in context["arguments_of"], content.columns,
-                  content.carried)
-    # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
-    units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
-             and not context["threads"] and method.template != "taylor")
-    needs = needs_of(method, content.band is not None)
-    called = functions(needs, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
-    return {"runtime": Parts(read, switches(method, shape, gathered, context["threads"], context["single"])),
-            "runtime_sizes": runtime_sizes(method, shape, gathered),
-            "integrated": called, "sensitive": shape.columns > 0, "resets": shape.resets, "held": shape.held,
-            "divided": units, "linked": "SYMDYN_HIDDEN" if units else "SYMDYN_APART static" if context["threads"] else "static"}
+    return read
 
 
 # Reading the templates takes longer than filling them in, and the shipped ones stay as they are.
@@ -268,63 +263,37 @@ def _template_fault(template: str, error: Exception) -> str:
     return f"template {where}: {error}"
 
 
-def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool,
-             lanes: Batch | None, many: Batch | None, method: str, states: int) -> dict[str, Any]:
-    groups = content.groups
-    sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
-    n_x = sizes["q"] + sizes["u"] + sizes["z"]
+def _context(content: Content, program: Program, dialect: Dialect, options: Options, read: Callable[[str], str], method: Method,
+             gathered: Gathered, integrates: bool, lanes: Batch | None, many: Batch | None, single: bool, states: int) -> Context:
     # A file with the name of a standard module would be imported in its place by whatever runs next to it.
     # The runtime in C has names that begin with symdyn_.
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
-    written = [way for f in program.functions for way in f.ways]
-    calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
-    wanted = standalone and states > 0
-    reference = None
-    if wanted:
-        reference = make_reference(content.tapes, groups, content.defaults, calls, content.singular_fallback, states)
-    uses = {f.name: f.arguments for f in program.functions}
+    written = [way for f in program.functions for way in f.with_called]
+    arguments = {f.name: f.arguments for f in program.functions}
+    metadata = _metadata(name, content, program)
+    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, *program.common, program.prologue)])
+    user_texts = texts_of_user_functions(program.user_functions, dialect.name, name)
+    identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
+    model = Model(metadata, hashlib.sha256(identity.encode()).hexdigest()[:16], tuple(_header(content, program)),
+                  _tables(content))
+    calls = Calls(metadata.sizes, arguments)
+    needs = Needs(sign="symdyn_sign(" in text, sincos="symdyn_sincos(" in text or gathered.sincos,
+                  columns=any(f.along and not f.motion for f in written), motion_columns=any(f.motion for f in written))
+    manifold = _manifold(content, program)
+    shape = _shape(content, manifold, arguments)
+    called = functions(needs_of(method, content.band is not None), arguments, calls.at, shape.sizes["inputs"], shape.n_rows > 0)
+    runtime = Parts(read, switches(method, shape, gathered, options.threads, single))
+    return Context(
+        model=model, program=program, options=options, calls=calls, needs=needs, algorithms=_algorithms(program),
+        user_texts=tuple(user_texts), manifold=manifold, runtime=runtime, lanes=lanes, many=many,
+        integrator=Integrator(method, shape, gathered, tuple(called), tuple(runtime_sizes(method, shape, gathered)))
+        if integrates else None,
+        reference=_reference(content, written, states) if options.standalone and states > 0 else None)
 
-    def signature(f: Function) -> str:
-        return ", ".join([_C_TYPE[g] for g in f.arguments] + ["double *out"])
 
-    def along_signature(part: Function | Part) -> str:
-        return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
-
-    def part_signature(part: Part) -> str:
-        return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
-
-    def lanes_signature(part: Function | Part) -> str:
-        vectors = {g: "symdyn_vector t" if g == "t" else f"const symdyn_vector *{g}" for g in _C_TYPE}
-        return "".join(f"{vectors[g]}, " for g in part.arguments)
-
-    def lanes_call(part: Function | Part) -> str:
-        return ", ".join(f"lanes->{g}" if g in ("p", "c", "inputs") else state(g, "x") for g in part.arguments)
-
-    def part_call(part: Part) -> str:
-        return "".join(f"{g}, " for g in part.arguments)
-
-    def state(argument: str, base: str) -> str:
-        offset = {"q": 0, "u": sizes["q"], "z": sizes["q"] + sizes["u"]}.get(argument)
-        return argument if offset is None else base if offset == 0 else f"{base} + {offset}"
-
-    def rows_call(f: Function) -> str:
-        strided = {"t": "frame->t[i * frame->t_stride]", "p": "frame->p", "c": "frame->c",
-                   "ud": f"frame->ud + i * frame->ud_stride * {sizes['ud']}",
-                   "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes['inputs']}"}
-        x = f"frame->x + i * frame->x_stride * {n_x}"
-        return ", ".join([strided.get(g) or state(g, x) for g in f.arguments] + [f"frame->out + i * {f.size}"])
-
-    def field_call(function: str, result: str) -> str:
-        """Arguments of a call from the integrator, at t and x."""
-        return ", ".join([f"problem->{g}" if g in ("p", "c") else state(g, "x") for g in uses.get(function, ())] + [result])
-
-    projection = None
-    if all(n in uses for n in CORRECTIONS):
-        projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
-                      "turning": [turns(content.units.get(n)) for n in groups["u"]],
-                      "angles": [is_angle(content.units.get(n)) for n in groups["q"]]}
-
-    metadata = Metadata(
+def _metadata(name: str, content: Content, program: Program) -> Metadata:
+    groups = content.groups
+    return Metadata(
         name, content.formulation, symdyn.__version__, q=tuple(groups["q"]), u=tuple(groups["u"]), z=tuple(groups["z"]),
         ud=tuple(groups["ud"]), inputs=tuple(groups["inputs"]), parameters=tuple(groups["p"]),
         defaults=tuple(content.defaults.get(n) for n in groups["p"]), initial=dict(content.initial),
@@ -333,49 +302,29 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         outputs=tuple((n, tuple(shape)) for n, shape in content.outputs), reasons=tuple(program.reasons), n_c=program.n_c,
         operations={f.name: f.count for f in program.functions},
         arguments={f.name: tuple(f.arguments) for f in program.functions})
-    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, *program.common, program.prologue)])
-    user_texts = texts_of_user_functions(program.user_functions, dialect.name, name)
-    identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
-    return {
-        "name": name, "formulation": content.formulation, "version": symdyn.__version__,
-        "method": method_of(method), "has_events": EVENTS in uses, "events": content.events,
-        "event_leaves": content.event_leaves,
-        "panels": panels,
-        "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
-        "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
-        "parameters": list(groups["p"]), "metadata": _metadata_lines(metadata),
-        "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
-        "n_in": sizes["inputs"], "n_ud": sizes["ud"],
-        "signature": signature, "part_signature": part_signature, "part_call": part_call,
-        "along_signature": along_signature, "uses_columns": any(f.along and not f.motion for f in written),
-        "uses_motion_columns": any(f.motion for f in written),
-        "lanes": lanes, "many": many, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
-        "one_call": ", ".join([*("time" if g == "t" else state(g, "one") for g in uses.get("rhs", ())), "result"]),
-        "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
-        "rows_call": rows_call, "shape_text": _shape_text,
-        "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
-        "uses_sincos": "symdyn_sincos(" in text, "intrinsics": program.intrinsics, "user_texts": user_texts,
-        "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
-        "solver_sizes": _solver_sizes(program), "algorithms": _algorithms(program),
-        "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
-        "field_call": field_call, "arguments_of": uses, "projection": projection,
-        "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
-        "projects": projection is not None or bool(content.unit_groups),
-        "tables": _tables(content),
-    }
 
 
-def _metadata_lines(metadata: Metadata) -> list[tuple[str, str]]:
-    """Keys and values as Python text, with the state and the sizes that follow from the names."""
-    sizes = metadata.sizes
-    lines: dict[str, Any] = {}
-    for key, value in metadata.as_plain().items():
-        lines[key] = value
-        if key == "z":
-            lines["x"] = list(metadata.x)
-        if key == "units":
-            lines["sizes"] = {"x": sizes.x, **dataclasses.asdict(sizes)}
-    return [(repr(key), repr(value)) for key, value in lines.items()]
+def _reference(content: Content, written: Sequence[Function], states: int) -> Reference:
+    calls = {f.name: call_of(f) for f in written}
+    return make_reference(content.tapes, content.groups, content.defaults, calls, content.singular_fallback, states)
+
+
+def _manifold(content: Content, program: Program) -> Manifold:
+    q, u = content.groups["q"], content.groups["u"]
+    corrections = None
+    if all(n in program.names for n in CORRECTIONS):
+        n_rows = program.named(CORRECTIONS[0]).size - len(q)
+        corrections = Corrections(n_rows, n_rows + max(len(q), len(u)), tuple(turns(content.units.get(n)) for n in u),
+                                  tuple(is_angle(content.units.get(n)) for n in q))
+    return Manifold(tuple(tuple(list(q).index(n) for n in group) for group in content.unit_groups), corrections)
+
+
+def _shape(content: Content, manifold: Manifold, arguments: Mapping[str, Sequence[str]]) -> Shape:
+    looks = EVENTS in arguments
+    return Shape({g: len(content.groups[g]) for g in ("q", "u", "z", "inputs")},
+                 manifold.corrections.n_rows if manifold.corrections else 0, manifold.unit_groups,
+                 content.events if looks else (), content.event_leaves if looks else (), "reset_directions" in arguments,
+                 content.columns, content.carried)
 
 
 def _solver_sizes(program: Program) -> list[tuple[str, str]]:
@@ -392,14 +341,10 @@ def _solver_sizes(program: Program) -> list[tuple[str, str]]:
     return list(result.items())
 
 
-def _algorithms(program: Program) -> list[str]:
-    """The texts in Python that numeric algorithms share with the package."""
-    names = dict.fromkeys(name for intrinsic in program.intrinsics for name in ("states", _TEXTS[intrinsic]))
-    return [text_of(name) for name in names]
-
-
-def _shape_text(f: Function) -> str:
-    return {0: "one number", 1: f"{f.size} numbers"}.get(len(f.shape), " x ".join(map(str, f.shape)) + ", row by row")
+def _algorithms(program: Program) -> Algorithms:
+    names = tuple(program.intrinsics)
+    texts = dict.fromkeys(name for intrinsic in names for name in ("states", _TEXTS[intrinsic]))
+    return Algorithms(names, tuple(text_of(name) for name in texts), tuple(_solver_sizes(program)))
 
 
 def _header(content: Content, program: Program) -> list[str]:
@@ -421,11 +366,9 @@ def _header(content: Content, program: Program) -> list[str]:
     return [*lines, *[f"Skipped: {note}." for note in content.notes]]
 
 
-def _tables(content: Content) -> list[tuple[str, list[dict[str, str]]]]:
-    def rows(group: str, values: Mapping[str, float]) -> list[dict[str, str]]:
-        return [{"name": n, "unit": content.units.get(n, ""), "value": repr(float(values.get(n, 0.0)))}
-                for n in content.groups[group]]
+def _tables(content: Content) -> dict[str, tuple[Row, ...]]:
+    def rows(group: str, values: Mapping[str, float]) -> tuple[Row, ...]:
+        return tuple(Row(n, content.units.get(n, ""), repr(float(values.get(n, 0.0)))) for n in content.groups[group])
 
-    return [("coordinates", rows("q", content.initial)), ("speeds", rows("u", content.initial)),
-            ("states", rows("z", content.initial)), ("inputs", rows("inputs", content.initial)),
-            ("parameters", rows("p", content.defaults))]
+    return {"coordinates": rows("q", content.initial), "speeds": rows("u", content.initial), "states": rows("z", content.initial),
+            "inputs": rows("inputs", content.initial), "parameters": rows("p", content.defaults)}

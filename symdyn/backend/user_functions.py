@@ -38,6 +38,11 @@ class UserText:
     spare: tuple[str, ...]
     parts: tuple[str, ...] = ()
 
+    @property
+    def entries(self) -> str:
+        """Names of the functions in the text, with commas between."""
+        return ", ".join(f.entry for f in self.functions)
+
 
 def called(tape: Tape) -> tuple[UserFunction, ...]:
     """Functions that a tape calls, by name. Raises SymdynError for two that differ and have one name."""

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symdyn import panels
 from symdyn.backend.band import Band
+from symdyn.backend.context import Corrections, Integrator, Manifold
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.integrated import Shape, sizes, switches
 from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import METHODS
-from symdyn.backend.methods.gauss import COEFFICIENTS
+from symdyn.backend.methods.gauss import OfGauss
 from symdyn.backend.methods.radau import FIVE_STAGES, THREE_STAGES
 from symdyn.backend.packed import Places
 from symdyn.backend.source import _shipped, template_folders
@@ -55,16 +56,15 @@ def build(tmp_path: Path) -> Build:
 
 
 def integrator(method: str, shape: Shape, functions: dict[str, str], tmp_path: Path, further: str = "",
-               band: Band | None = None, **tables: Any) -> str:
+               band: Band | None = None, corrections: Corrections | None = None) -> str:
     """A text that includes runtime.c with a model: statements of its functions by their names."""
     record = METHODS[method]
-    gathered: dict[str, Any] = {"second_order": True} if method == "gauss" else {}
+    gathered: Gathered = OfGauss(second_order=True) if method == "gauss" else Gathered()
     if method.startswith("radau"):
         assert record.gather is not None
-        gathered.update(record.gather(SimpleNamespace(band=band)))
-    context = {"method": record, "unit_groups": shape.unit_groups, "projection": tables.get("projection"), "panels": panels,
-               "has_events": bool(shape.events), "events": shape.events, "resets": shape.resets, "n_x": shape.n_x,
-               "held": shape.held, "event_leaves": shape.leaves, "gauss": COEFFICIENTS, **gathered}
+        gathered = record.gather(SimpleNamespace(band=band))
+    context = {"integrator": Integrator(record, shape, gathered, (), ()),
+               "manifold": Manifold(tuple(map(tuple, shape.unit_groups)), corrections)}
     tables_text = _shipped(*template_folders()).get_template("c/interface.c.jinja").render(context)
     bodies = "".join(f"static int symdyn_{name}{BOUNDED if name.endswith('_of') else SIGNATURE} {{\n(void)problem;\n"
                      f"{'' if name.endswith('_of') else '(void)t, (void)x;'}\n{body}\nreturn 0;\n}}\n"
@@ -321,6 +321,7 @@ def test_a_row_of_masses_by_factors_in_a_band(method: str, build: Build, tmp_pat
     assert found[1][2].n_factorizations < 0.9 * found[0][2].n_factorizations and found[0][3] > 1.5 * found[1][3]
 
 
+ONE_ROW = Corrections(1, 3, (False, False), (False, False))
 CIRCLE = {
     "field": "const double v = x[2]*x[2] + x[3]*x[3]; out[0] = x[2]; out[1] = x[3]; out[2] = -v*x[0]; out[3] = -v*x[1];",
     "position_correction_at": "const double s = x[0]*x[0] + x[1]*x[1], c = 0.5*(s - 1.0); out[0] = c; out[1] = -c*x[0]/s; "
@@ -333,8 +334,7 @@ CIRCLE = {
 @pytest.mark.parametrize(("project", "least", "most"), [(True, 0.0, 1e-12), (False, 1e-9, 1.0)])
 def test_projection_onto_a_circle(project: bool, least: float, most: float, build: Build, tmp_path: Path) -> None:
     shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), ())
-    tables = {"n_rows": 1, "turning": [0, 0], "angles": [0, 0]}
-    library = build(integrator("bs54", shape, CIRCLE, tmp_path, projection=tables))
+    library = build(integrator("bs54", shape, CIRCLE, tmp_path, corrections=ONE_ROW))
     run = Run(library, [1.0, 0.0, 0.0, 1.0], (0.0, 50.0), 1e-5, project=project)
     x = run.at(np.linspace(0, 50, 101))
     off = np.abs((x[:, :2]**2).sum(axis=1) - 1).max()
@@ -393,8 +393,7 @@ def test_a_reset_on_a_circle_takes_the_other_speed_along(build: Build, tmp_path:
     functions = CIRCLE | {"events_at": "out[0] = x[0] - 0.5;", "event_resets_at": "out[0] = -x[2];",
                           "reset_directions_at": "out[0] = out[1] = 0.0; out[2] = x[1]*x[1]; out[3] = -x[1]*x[0];"}
     shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), [EventRecord("a", -1, False, (2,), False, (), ())], (), True)
-    tables = {"n_rows": 1, "turning": [0, 0], "angles": [0, 0]}
-    library = build(integrator("dop853", shape, functions, tmp_path, projection=tables))
+    library = build(integrator("dop853", shape, functions, tmp_path, corrections=ONE_ROW))
     run = Run(library, [1.0, 0.0, 0.0, 1.0], (0.0, 2 * np.pi / 3), 1e-11, project=True, look=1)
     x = run.at(np.array([2 * np.pi / 3]))
     rows, v = run.events(1), [-np.sqrt(0.75), 0.5]

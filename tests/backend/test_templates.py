@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -14,7 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symdyn.backend.context import Algorithms, Calls, Context, Integrator, Manifold, Model, Needs, Options
 from symdyn.backend.dialect import identifier
+from symdyn.backend.function import Function
+from symdyn.backend.program import Program
+from symdyn.backend.reference import Reference
 from symdyn.backend.source import backends, template_folders
 from symdyn.errors import SymdynError
 from symdyn.functions.table import FUNCTIONS
@@ -111,7 +116,8 @@ def test_command_line(folder: Path, tmp_path: Path) -> None:
 
 def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "c").mkdir()
-    (tmp_path / "c" / "main.c.jinja").write_text("// {{ name }} has {{ n_q }} coordinates\nint main(void) { return 0; }\n")
+    (tmp_path / "c" / "main.c.jinja").write_text(
+        "// {{ model.name }} has {{ model.n_q }} coordinates\nint main(void) { return 0; }\n")
     mine, usual = (emit(derived("pendulum"), "c", templates=t).files for t in (tmp_path, None))
     assert mine["main.c"] == "// pendulum has 1 coordinates\nint main(void) { return 0; }\n"
     assert {n: t for n, t in mine.items() if n != "main.c"} == {n: t for n, t in usual.items() if n != "main.c"}
@@ -121,7 +127,7 @@ def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Pa
 def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
     """What a shipped template includes is looked for in the user's folder first, too."""
     (tmp_path / "c").mkdir()
-    (tmp_path / "c" / "simulate.c.jinja").write_text("// no integrator for {{ name }}\n")
+    (tmp_path / "c" / "simulate.c.jinja").write_text("// no integrator for {{ model.name }}\n")
     text = emit(derived("pendulum"), "c", templates=tmp_path).files["pendulum.c"]
     assert "// no integrator for pendulum\n" in text and "dop853" not in text
 
@@ -162,12 +168,12 @@ def test_missing_folder_dialect_or_backend(derived: Callable[..., Any], folder: 
 
 
 @pytest.mark.parametrize(("line", "broken", "message"), [
-    (2, "{% for line in header %}\n{{ lin }}\n{% endfor %}\n", "'lin' is undefined"),
-    (3, "a\nb\n{% for line in header %}\n", "Unexpected end of template"),
-    (2, "a\n{{ name | upcase }}\n", "No filter named 'upcase'"),
+    (2, "{% for line in model.header %}\n{{ lin }}\n{% endfor %}\n", "'lin' is undefined"),
+    (3, "a\nb\n{% for line in model.header %}\n", "Unexpected end of template"),
+    (2, "a\n{{ model.name | upcase }}\n", "No filter named 'upcase'"),
     (2, "a\n{{ program.functoins }}\n", "no attribute 'functoins'"),
-    (3, "a\n\n{{ 1 + name }}\n", "unsupported operand"),
-    (1, "{{ signature() }}\n", "missing 1 required positional argument"),
+    (3, "a\n\n{{ 1 + model.name }}\n", "unsupported operand"),
+    (1, "{{ calls.signature() }}\n", "missing 1 required positional argument"),
 ])
 def test_broken_template(line: int, broken: str, message: str, derived: Callable[..., Any], folder: Path) -> None:
     path = folder / "ecmascript" / "model.js.jinja"
@@ -222,26 +228,54 @@ def test_broken_dialect(old: str, new: str, message: str, derived: Callable[...,
 # -- what the README says
 
 
-def test_readme_lists_what_templates_get(derived: Callable[..., Any], tmp_path: Path) -> None:
-    """Every name in the table is there, and every name that is there is in the table."""
-    from symdyn.backend import source
+def members(record: type) -> set[str]:
+    """What templates may read: fields, properties and methods."""
+    own = {name for name, value in vars(record).items() if isinstance(value, property) or callable(value)}
+    return {name for name in own | {f.name for f in dataclasses.fields(record)} if not name.startswith("_")}
 
-    seen: list[set[str]] = []
-    original = source._context
 
-    def spy(*arguments: Any) -> dict[str, Any]:
-        context = original(*arguments)
-        seen.append(set(context))
-        return context
+@pytest.mark.parametrize(("heading", "record"), [
+    ("model", Model), ("options", Options), ("calls", Calls), ("needs", Needs), ("algorithms", Algorithms),
+    ("manifold", Manifold), ("integrator", Integrator), ("program", Program), ("functions", Function),
+    ("reference", Reference)])
+def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
+    """Every name in the table of a record is there, and every name that is there is in the table."""
+    assert listed(f"### {heading}\n") == members(record)
 
+
+@pytest.fixture
+def context(derived: Callable[..., Any]) -> Context:
+    """What the templates of a module in C get."""
+    seen: list[Context] = []
+
+    def spy(self: Context) -> dict[str, Any]:
+        seen.append(self)
+        return names(self)
+
+    names = Context.names
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(source, "_context", spy)
-        emit(derived("pendulum"), "numpy")
-    text = (SHIPPED / "README.md").read_text(encoding="utf-8")
-    table = text.split("## What a template gets")[1].split("`program.functions`, and")[0]
-    listed = set(re.findall(r"`(\w+)(?:\([^)]*\))?`", "\n".join(
-        line.split("|")[1] for line in table.splitlines() if line.startswith("| `"))))
-    assert listed == seen[0]
+        patch.setattr(Context, "names", spy)
+        emit(derived("pendulum"), "c")
+    return seen[0]
+
+
+def test_readme_lists_what_templates_get(context: Context) -> None:
+    assert listed("## What a template gets\n") == set(context.names())
+
+
+def test_records_of_templates_are_frozen(context: Context) -> None:
+    records = [context, *[r for r in context.names().values() if dataclasses.is_dataclass(r)], context.program.prologue]
+    assert len(records) == 11
+    for record in records:
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(record, dataclasses.fields(record)[0].name, None)
+
+
+def listed(heading: str) -> set[str]:
+    """The names in the first table after a heading of the README."""
+    text = (SHIPPED / "README.md").read_text(encoding="utf-8").split(f"\n{heading}")[1].split("\n#")[0]
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    return set(re.findall(r"`(\w+)(?:\([^)]*\))?`", "\n".join(rows)))
 
 
 def test_identifiers() -> None:

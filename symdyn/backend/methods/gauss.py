@@ -9,10 +9,10 @@ tolerated is made up of equal parts. Stages 4, 6, 8, 10 were tried: 8 took the f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.methods.record import Method
 from symdyn.tape.node import SPEED, Node
 
@@ -70,12 +70,19 @@ COEFFICIENTS = Gauss(
             1.0818949631055814)))
 
 
-def _gather(content: Any, *_: Any) -> Mapping[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class OfGauss(Gathered):
+    """What the template gets: the coefficients."""
+
+    coefficients: Gauss = COEFFICIENTS
+
+
+def _gather(content: Any, *_: Any) -> OfGauss:
     """The coefficients, and whether q_dot = u: then every sweep takes the new speeds for the coordinates at once."""
     q, u = content.groups["q"], content.groups["u"]
     rates = content.tapes["rhs"].outputs["rhs"].entries[:len(q)]
     leaves = [e.args[1] if isinstance(e, Node) and e.op == "leaf" and e.mask == SPEED else None for e in rates]
-    return {"gauss": COEFFICIENTS, "second_order": leaves == list(u)}
+    return OfGauss(second_order=leaves == list(u))
 
 
 GAUSS = Method(

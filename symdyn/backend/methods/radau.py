@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
+from symdyn.backend.gathered import Gathered
 from symdyn.backend.methods.record import Method
 
 Vector = tuple[float, ...]
@@ -58,6 +58,13 @@ class Collocation:
         return (*weights, sum(k * w * at**(k - 1) for k, w in enumerate(self.tail) if k))
 
 
+@dataclass(frozen=True, kw_only=True)
+class OfRadau(Gathered):
+    """What the template gets: the coefficients."""
+
+    coefficients: Collocation
+
+
 FIVE_STAGES = Collocation(
     nodes=(0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
     inverse=((8.755923977938362, 2.8919426153801173, -0.8751863962002651, 0.3997052079399655, -0.13370616384921583),
@@ -102,10 +109,9 @@ SOURCE = (
     "Radau methods, J. Comput. Appl. Math. 111 (1999) 93-111 (5 stages).")
 
 
-
-def _gather(collocation: Collocation) -> Callable[..., Mapping[str, Any]]:
+def _gather(coefficients: Collocation) -> Callable[..., OfRadau]:
     """The coefficients, and the order in which the matrix has a narrow band."""
-    return lambda content, *_: {"collocation": collocation, "band": content.band}
+    return lambda content, *_: OfRadau(coefficients=coefficients, band=content.band)
 
 
 RADAU = Method(

@@ -1,0 +1,23 @@
+"""What a method of integration gathers from a mechanism for its template."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symdyn.backend.band import Band
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gathered:
+    """What the template of a method gets of its own, and what the parts of the runtime depend on of that.
+
+    second_order   whether q_dot = u; None: the method does not ask
+    unrolled       whether sums are written out one by one
+    sincos         whether sines and cosines are taken all at once
+    band           the order in which a matrix has a narrow band; None: it is taken as a whole
+    """
+
+    second_order: bool | None = None
+    unrolled: bool = False
+    sincos: bool = False
+    band: Band | None = None
