@@ -41,6 +41,8 @@ from symdyn.turning import turns
 
 VERSIONS = (3, 2)
 KINDS = ("model_exchange", "co_simulation")
+# Of the description in version 2.
+_ELEMENTS = {"model_exchange": "ModelExchange", "co_simulation": "CoSimulation"}
 # Of a step of co-simulation, where the importer gives none.
 TOLERANCE = 1e-9
 # An FMU allocates memory and compares texts; the package of tcc brings neither the headers of libc nor the paths to them.
@@ -128,7 +130,8 @@ def _files(module: Module, source: Source, version: int, kind: str, start: Mappi
     text = next(iter(source.files.values()))
     digits = text.split("Model hash ", 1)[1][:16]
     context = {
-        "name": of_code.name, "title": module.name, "version": symdyn.__version__, "kind": kind, "hash": digits,
+        "name": of_code.name, "title": module.name, "version": symdyn.__version__, "kind": kind, "element": _ELEMENTS[kind],
+        "hash": digits,
         "token": f"{of_code.name}-{digits}-fmi{version}-{kind}", "tolerance": repr(TOLERANCE),
         "duration": repr(metadata.duration or 1.0),
         "description": f"{metadata.formulation} equations of motion of {module.name}, {len(metadata.bodies)} bodies",

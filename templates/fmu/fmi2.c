@@ -60,13 +60,18 @@ FMI2_EXPORT const char *FMI2_NAME(fmi2GetTypesPlatform)(void) { return "default"
 FMI2_EXPORT const char *FMI2_NAME(fmi2GetVersion)(void) { return "2.0"; }
 
 FMI2(fmi2SetDebugLogging)(fmi2Component component, fmi2Boolean on, size_t n, const fmi2String categories[]) {
-    (void)component, (void)on, (void)n, (void)categories;
+    (void)component;
+    (void)on;
+    (void)n;
+    (void)categories;
     return fmi2OK;  // what is logged are errors and warnings
 }
 
 FMI2_EXPORT fmi2Component FMI2_NAME(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
     const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
-    (void)resources, (void)visible, (void)logging;
+    (void)resources;
+    (void)visible;
+    (void)logging;
     fmu_instance *const f = (type == fmi2ModelExchange) == FMU_MODEL_EXCHANGE ? fmu_new(name, token) : NULL;
     if (!f) {
         if (functions && functions->logger)
@@ -120,11 +125,13 @@ FMI2(fmi2SetReal)(fmi2Component component, const fmi2ValueReference which[], siz
 // All variables are of the type Real; of others there are none.
 #define FMI2_OTHER(type)                                                                                                         \
     FMI2(fmi2Get##type)(fmi2Component component, const fmi2ValueReference which[], size_t n, fmi2##type values[]) {              \
-        (void)which, (void)values;                                                                                               \
+        (void)which;                                                                                                             \
+        (void)values;                                                                                                            \
         return n ? unsupported(component, "a variable of the type " #type) : fmi2OK;                                             \
     }                                                                                                                            \
     FMI2(fmi2Set##type)(fmi2Component component, const fmi2ValueReference which[], size_t n, const fmi2##type values[]) {        \
-        (void)which, (void)values;                                                                                               \
+        (void)which;                                                                                                             \
+        (void)values;                                                                                                            \
         return n ? unsupported(component, "a variable of the type " #type) : fmi2OK;                                             \
     }
 FMI2_OTHER(Integer)
@@ -237,19 +244,26 @@ FMI2(fmi2GetNominalsOfContinuousStates)(fmi2Component component, fmi2Real nomina
 
 FMI2(fmi2SetRealInputDerivatives)(
     fmi2Component component, const fmi2ValueReference which[], size_t n, const fmi2Integer orders[], const fmi2Real values[]) {
-    (void)which, (void)n, (void)orders, (void)values;
+    (void)which;
+    (void)n;
+    (void)orders;
+    (void)values;
     return unsupported(component, "derivatives of inputs by time");
 }
 
 FMI2(fmi2GetRealOutputDerivatives)(
     fmi2Component component, const fmi2ValueReference which[], size_t n, const fmi2Integer orders[], fmi2Real values[]) {
-    (void)which, (void)n, (void)orders, (void)values;
+    (void)which;
+    (void)n;
+    (void)orders;
+    (void)values;
     return unsupported(component, "derivatives of outputs by time");
 }
 
 FMI2(fmi2DoStep)(fmi2Component component, fmi2Real now, fmi2Real step, fmi2Boolean no_way_back) {
     double reached;
-    (void)no_way_back, (void)now;
+    (void)no_way_back;
+    (void)now;
     const int code = fmu_step(component, step, &reached);
     return code == FMU_STOPPED ? fmi2Discard : status_of(code);
 }
@@ -257,7 +271,8 @@ FMI2(fmi2DoStep)(fmi2Component component, fmi2Real now, fmi2Real step, fmi2Boole
 FMI2(fmi2CancelStep)(fmi2Component component) { return unsupported(component, "steps that run in the background"); }
 
 FMI2(fmi2GetStatus)(fmi2Component component, const fmi2StatusKind kind, fmi2Status *value) {
-    (void)component, (void)kind;
+    (void)component;
+    (void)kind;
     *value = fmi2OK;
     return fmi2OK;
 }
@@ -269,7 +284,8 @@ FMI2(fmi2GetRealStatus)(fmi2Component component, const fmi2StatusKind kind, fmi2
 }
 
 FMI2(fmi2GetIntegerStatus)(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value) {
-    (void)kind, (void)value;
+    (void)kind;
+    (void)value;
     return unsupported(component, "a status of this kind");
 }
 
@@ -280,6 +296,7 @@ FMI2(fmi2GetBooleanStatus)(fmi2Component component, const fmi2StatusKind kind, f
 }
 
 FMI2(fmi2GetStringStatus)(fmi2Component component, const fmi2StatusKind kind, fmi2String *value) {
-    (void)kind, (void)value;
+    (void)kind;
+    (void)value;
     return unsupported(component, "a status of this kind");
 }

@@ -56,7 +56,10 @@ static fmi3Status unsupported(fmi3Instance instance, const char *what) {
 FMI3_EXPORT const char *FMI3_NAME(fmi3GetVersion)(void) { return "3.0"; }
 
 FMI3(fmi3SetDebugLogging)(fmi3Instance instance, fmi3Boolean on, size_t n, const fmi3String categories[]) {
-    (void)instance, (void)on, (void)n, (void)categories;
+    (void)instance;
+    (void)on;
+    (void)n;
+    (void)categories;
     return fmi3OK;  // what is logged are errors and warnings
 }
 
@@ -74,7 +77,9 @@ static fmi3Instance instantiated(
 
 FMI3_EXPORT fmi3Instance FMI3_NAME(fmi3InstantiateModelExchange)(fmi3String name, fmi3String token, fmi3String resources,
     fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback *log) {
-    (void)resources, (void)visible, (void)logging;
+    (void)resources;
+    (void)visible;
+    (void)logging;
     return instantiated(name, token, environment, log, 1);
 }
 
@@ -82,7 +87,13 @@ FMI3_EXPORT fmi3Instance FMI3_NAME(fmi3InstantiateCoSimulation)(fmi3String name,
     fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
     const fmi3ValueReference intermediate[], size_t n_intermediate, fmi3InstanceEnvironment environment,
     fmi3LogMessageCallback *log, fmi3IntermediateUpdateCallback *update) {
-    (void)resources, (void)visible, (void)logging, (void)event_mode, (void)intermediate, (void)n_intermediate, (void)update;
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    (void)event_mode;
+    (void)intermediate;
+    (void)n_intermediate;
+    (void)update;
     fmu_instance *const f = instantiated(name, token, environment, log, 0);
     if (f) f->may_return_early = early_return;
     return f;
@@ -91,7 +102,14 @@ FMI3_EXPORT fmi3Instance FMI3_NAME(fmi3InstantiateCoSimulation)(fmi3String name,
 FMI3_EXPORT fmi3Instance FMI3_NAME(fmi3InstantiateScheduledExecution)(fmi3String name, fmi3String token, fmi3String resources,
     fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback *log,
     fmi3ClockUpdateCallback *clock, fmi3LockPreemptionCallback *lock, fmi3LockPreemptionCallback *unlock) {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)clock, (void)lock, (void)unlock;
+    (void)name;
+    (void)token;
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    (void)clock;
+    (void)lock;
+    (void)unlock;
     if (log) log(environment, fmi3Error, "logStatusError", "this FMU has no scheduled execution");
     return NULL;
 }
@@ -139,12 +157,16 @@ FMI3(fmi3SetFloat64)(
 #define FMI3_OTHER(type, value_type)                                                                                             \
     FMI3(fmi3Get##type)(                                                                                                         \
         fmi3Instance instance, const fmi3ValueReference which[], size_t n, value_type values[], size_t n_values) {               \
-        (void)which, (void)values, (void)n_values;                                                                               \
+        (void)which;                                                                                                             \
+        (void)values;                                                                                                            \
+        (void)n_values;                                                                                                          \
         return n ? unsupported(instance, "a variable of the type " #type) : fmi3OK;                                              \
     }                                                                                                                            \
     FMI3(fmi3Set##type)(                                                                                                         \
         fmi3Instance instance, const fmi3ValueReference which[], size_t n, const value_type values[], size_t n_values) {         \
-        (void)which, (void)values, (void)n_values;                                                                               \
+        (void)which;                                                                                                             \
+        (void)values;                                                                                                            \
+        (void)n_values;                                                                                                          \
         return n ? unsupported(instance, "a variable of the type " #type) : fmi3OK;                                              \
     }
 FMI3_OTHER(Float32, fmi3Float32)
@@ -161,34 +183,48 @@ FMI3_OTHER(String, fmi3String)
 
 FMI3(fmi3GetBinary)(
     fmi3Instance instance, const fmi3ValueReference which[], size_t n, size_t sizes[], fmi3Binary values[], size_t n_values) {
-    (void)which, (void)sizes, (void)values, (void)n_values;
+    (void)which;
+    (void)sizes;
+    (void)values;
+    (void)n_values;
     return n ? unsupported(instance, "a variable of the type Binary") : fmi3OK;
 }
 
 FMI3(fmi3SetBinary)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const size_t sizes[],
     const fmi3Binary values[], size_t n_values) {
-    (void)which, (void)sizes, (void)values, (void)n_values;
+    (void)which;
+    (void)sizes;
+    (void)values;
+    (void)n_values;
     return n ? unsupported(instance, "a variable of the type Binary") : fmi3OK;
 }
 
 FMI3(fmi3GetClock)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, fmi3Clock values[]) {
-    (void)which, (void)values;
+    (void)which;
+    (void)values;
     return n ? unsupported(instance, "a clock") : fmi3OK;
 }
 
 FMI3(fmi3SetClock)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const fmi3Clock values[]) {
-    (void)which, (void)values;
+    (void)which;
+    (void)values;
     return n ? unsupported(instance, "a clock") : fmi3OK;
 }
 
 FMI3(fmi3GetNumberOfVariableDependencies)(fmi3Instance instance, fmi3ValueReference which, size_t *n) {
-    (void)which, (void)n;
+    (void)which;
+    (void)n;
     return unsupported(instance, "dependencies of single elements");
 }
 
 FMI3(fmi3GetVariableDependencies)(fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
     fmi3ValueReference independents[], size_t others[], fmi3DependencyKind kinds[], size_t n) {
-    (void)dependent, (void)elements, (void)independents, (void)others, (void)kinds, (void)n;
+    (void)dependent;
+    (void)elements;
+    (void)independents;
+    (void)others;
+    (void)kinds;
+    (void)n;
     return unsupported(instance, "dependencies of single elements");
 }
 
@@ -243,46 +279,68 @@ FMI3(fmi3ExitConfigurationMode)(fmi3Instance instance) { return unsupported(inst
 
 FMI3(fmi3GetIntervalDecimal)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, fmi3Float64 intervals[],
     fmi3IntervalQualifier qualifiers[]) {
-    (void)which, (void)n, (void)intervals, (void)qualifiers;
+    (void)which;
+    (void)n;
+    (void)intervals;
+    (void)qualifiers;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3GetIntervalFraction)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, uint64_t counters[],
     uint64_t resolutions[], fmi3IntervalQualifier qualifiers[]) {
-    (void)which, (void)n, (void)counters, (void)resolutions, (void)qualifiers;
+    (void)which;
+    (void)n;
+    (void)counters;
+    (void)resolutions;
+    (void)qualifiers;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3GetShiftDecimal)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, fmi3Float64 shifts[]) {
-    (void)which, (void)n, (void)shifts;
+    (void)which;
+    (void)n;
+    (void)shifts;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3GetShiftFraction)(
     fmi3Instance instance, const fmi3ValueReference which[], size_t n, uint64_t counters[], uint64_t resolutions[]) {
-    (void)which, (void)n, (void)counters, (void)resolutions;
+    (void)which;
+    (void)n;
+    (void)counters;
+    (void)resolutions;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3SetIntervalDecimal)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const fmi3Float64 intervals[]) {
-    (void)which, (void)n, (void)intervals;
+    (void)which;
+    (void)n;
+    (void)intervals;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3SetIntervalFraction)(
     fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[], const uint64_t resolutions[]) {
-    (void)which, (void)n, (void)counters, (void)resolutions;
+    (void)which;
+    (void)n;
+    (void)counters;
+    (void)resolutions;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3SetShiftDecimal)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const fmi3Float64 shifts[]) {
-    (void)which, (void)n, (void)shifts;
+    (void)which;
+    (void)n;
+    (void)shifts;
     return unsupported(instance, "a clock");
 }
 
 FMI3(fmi3SetShiftFraction)(
     fmi3Instance instance, const fmi3ValueReference which[], size_t n, const uint64_t counters[], const uint64_t resolutions[]) {
-    (void)which, (void)n, (void)counters, (void)resolutions;
+    (void)which;
+    (void)n;
+    (void)counters;
+    (void)resolutions;
     return unsupported(instance, "a clock");
 }
 
@@ -376,13 +434,18 @@ FMI3(fmi3EnterStepMode)(fmi3Instance instance) {
 
 FMI3(fmi3GetOutputDerivatives)(fmi3Instance instance, const fmi3ValueReference which[], size_t n, const int32_t orders[],
     fmi3Float64 values[], size_t n_values) {
-    (void)which, (void)n, (void)orders, (void)values, (void)n_values;
+    (void)which;
+    (void)n;
+    (void)orders;
+    (void)values;
+    (void)n_values;
     return unsupported(instance, "derivatives of outputs by time");
 }
 
 FMI3(fmi3DoStep)(fmi3Instance instance, fmi3Float64 now, fmi3Float64 step, fmi3Boolean no_way_back, fmi3Boolean *event_mode,
     fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
-    (void)no_way_back, (void)now;
+    (void)no_way_back;
+    (void)now;
     const int code = fmu_step(instance, step, reached);
     *event_mode = false;
     *terminate = code == FMU_STOPPED;
@@ -391,6 +454,7 @@ FMI3(fmi3DoStep)(fmi3Instance instance, fmi3Float64 now, fmi3Float64 step, fmi3B
 }
 
 FMI3(fmi3ActivateModelPartition)(fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time) {
-    (void)clock, (void)time;
+    (void)clock;
+    (void)time;
     return unsupported(instance, "scheduled execution");
 }

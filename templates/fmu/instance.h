@@ -172,7 +172,9 @@ static void fmu_take_motions(fmu_state *s, double t, double end) {
     s->breaks[0] = t;
     s->breaks[1] = end;
 #else
-    (void)s, (void)t, (void)end;
+    (void)s;
+    (void)t;
+    (void)end;
 #endif
 }
 
@@ -261,7 +263,8 @@ static int fmu_events_now(fmu_instance *f, double *values) {
 #if FMU_N_EVENTS
     return fmu_evaluate(f, fmu_events, "the events", FMU_N_EVENTS, values);
 #else
-    (void)f, (void)values;
+    (void)f;
+    (void)values;
     return FMU_GOOD;
 #endif
 }
@@ -432,7 +435,9 @@ static int fmu_partial(fmu_instance *f, unsigned int unknown, unsigned int known
         *value = f->by_x[row * FMU_N_X + (int)(known - FMU_OF_X)];
     return FMU_GOOD;
 #else
-    (void)unknown, (void)known, (void)value;
+    (void)unknown;
+    (void)known;
+    (void)value;
     return fmu_fail(f, "a derivative", "a function of this mechanism has no derivatives");
 #endif
 }

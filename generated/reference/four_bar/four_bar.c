@@ -391,7 +391,8 @@ SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
 // p: 14 parameters; out: 9 constants.
 SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out);
 SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out) {
-    (void)p, (void)out;
+    (void)p;
+    (void)out;
     const double m1 = p[1];
     const double lc1 = p[2];
     const double I1 = p[3];

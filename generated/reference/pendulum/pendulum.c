@@ -143,7 +143,8 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
 // p: 3 parameters; out: 3 constants.
 SYMDYN_EXPORT int pendulum_prologue(const double *p, double *out);
 SYMDYN_EXPORT int pendulum_prologue(const double *p, double *out) {
-    (void)p, (void)out;
+    (void)p;
+    (void)out;
     const double m = p[1];
     const double l = p[2];
     // inertia of the links, about their joints

@@ -54,7 +54,10 @@ SYMDYN_EXPORT int {name}_sundials_jacobian(double t, void *y, void *yd, void *ma
     const {name}_frame *frame = given->frame;
     const double *x = given->entries(y);
     double **columns = given->columns(matrix), *out = frame->out;
-    (void)yd, (void)a, (void)b, (void)c;
+    (void)yd;
+    (void)a;
+    (void)b;
+    (void)c;
     if ({name}_jacobian_x({jacobian_x}, out)) return 1;
     for (long i = 0; i < {n}; i++)
         for (long j = 0; j < {n}; j++) columns[j][i] = out[i * {n} + j];
@@ -80,7 +83,10 @@ SYMDYN_EXPORT int {name}_sundials_slopes(double t, double shift, void *y, void *
     const {name}_frame *frame = given->frame;
     const double *x = given->entries(y), *rates = given->entries(yd);
     double **columns = given->columns(matrix), *by_rates = frame->out, *by_x = frame->out + {n} * {n};
-    (void)r, (void)a, (void)b, (void)c;
+    (void)r;
+    (void)a;
+    (void)b;
+    (void)c;
     if ({name}_residual_rates({residual_rates}, by_rates)) return 1;
     if ({name}_residual_x({residual_x}, by_x)) return 1;
     for (long i = 0; i < {n}; i++)
