@@ -241,7 +241,7 @@ class Algorithms:
     """Numeric algorithms that are called.
 
     names    of these, in order
-    texts    in Python, one file of `symdyn/tape/algorithms` each
+    texts    in Python, those of files in folders `algorithms`
     macros   pairs of a macro and its value: sizes and constants of those that are called (C)
     """
 

@@ -14,6 +14,7 @@ from symdyn.backend.rolled import Rolled
 from symdyn.backend.user_functions import called
 from symdyn.backend.writer import PROLOGUE, STOPPING, Writer, checks_of, cores_of
 from symdyn.tape.external import UserFunction
+from symdyn.tape.intrinsics import Intrinsic
 from symdyn.tape.node import SEED, Node
 from symdyn.tape.tape import Output, Tape, count_of, reachable, unsigned
 
@@ -42,6 +43,7 @@ class Program:
 
     reasons   what the return codes 1, 2, ... mean
     intrinsics   numeric algorithms that are called: name -> largest size of each kind
+    algorithms   of each of these one call
     one_size  those of them that are called with one size only
     user_functions   functions of the user that are called, by name
     n_c       number of constants that the prologue computes
@@ -55,6 +57,7 @@ class Program:
     intrinsics: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     user_functions: tuple[UserFunction, ...] = ()
     one_size: frozenset[str] = frozenset()
+    algorithms: tuple[Intrinsic, ...] = ()
     common: tuple[Function, ...] = ()
 
     @property
@@ -187,14 +190,19 @@ def _either(name: str, title: str, regular: Function, singular_fallback: Functio
                     regular.longest_chain, regular=regular, singular_fallback=singular_fallback)
 
 
-def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str]]:
-    """Numeric algorithms with their largest sizes, functions of the user, and the algorithms that are called with one size."""
+def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str],
+                                     tuple[Intrinsic, ...]]:
+    """Numeric algorithms with their largest sizes, functions of the user, the algorithms that are called with one size, and of
+    each algorithm one call."""
     sizes: dict[str, set[tuple[int, ...]]] = {}
+    calls: dict[str, Intrinsic] = {}
     for node in tape.arrays.chosen(tape.arrays.does("call")):
         if not isinstance(node.args[0], UserFunction):
             sizes.setdefault(node.args[0].name, set()).add(tuple(node.args[0].sizes))
+            calls.setdefault(node.args[0].name, node.args[0])
     largest = {name: tuple(map(max, zip(*result, strict=True))) for name, result in sorted(sizes.items())}
-    return largest, called(tape), frozenset(name for name, result in sizes.items() if len(result) == 1)
+    one_size = frozenset(name for name, result in sizes.items() if len(result) == 1)
+    return largest, called(tape), one_size, tuple(calls[name] for name in largest)
 
 
 def _columns(columns: Columns, name: str, title: str, drafts: Drafts, vectors: Drafts) -> Function:

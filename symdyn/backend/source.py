@@ -61,11 +61,8 @@ if TYPE_CHECKING:
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
 EVENTS = "events"
-# The file of symdyn/tape/algorithms that an algorithm is in.
-_TEXTS = {"symdyn_saddle": "saddle", "symdyn_multipliers": "saddle", "symdyn_cube": "cube", "symdyn_catenary": "catenary"}
-# What calls an algorithm.
-_CALLED_BY = {**dict.fromkeys(("symdyn_saddle", "symdyn_multipliers"), "constraints"), "symdyn_cube": "sd.Buoyancy",
-              "symdyn_catenary": "sd.MooringLine"}
+# What algorithms need for many states at once.
+_STATES = "symdyn.tape.algorithms.states"
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -197,11 +194,12 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         try:
             text = environment.get_template(f"{backend}/{template}").render(context.names())
         except jinja2.TemplateNotFound as error:
-            algorithm = Path(str(error.name)).name.partition(".")[0]
-            if algorithm not in _TEXTS:
+            name = Path(str(error.name)).name.partition(".")[0]
+            missing = next((a for a in program.algorithms if a.name == name), None)
+            if missing is None:
                 raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
             raise UnsupportedExpression(
-                f"{content.name} calls the numeric algorithm {algorithm}, by {_CALLED_BY[algorithm]}, and the templates of "
+                f"{content.name} calls the numeric algorithm {name}, by {missing.called_by}, and the templates of "
                 f"{backend} have no text of it; take C or NumPy, model the load by expressions, or add {error.name}") from None
         except (jinja2.TemplateError, TypeError, ValueError, LookupError, AttributeError) as error:
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
@@ -214,7 +212,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
 
 def _check_single(name: str, program: Program) -> None:
     """Raises UnsupportedExpression for algorithms, and functions of the user, whose texts are in double precision."""
-    faults = [f"{intrinsic} ({_CALLED_BY[intrinsic]})" for intrinsic in program.intrinsics]
+    faults = [f"{a.name} ({a.called_by})" for a in program.algorithms]
     faults += [f.signature for f in program.user_functions]
     if faults:
         raise UnsupportedExpression(f"{name}: there is no single precision of {', '.join(faults)}, which its right-hand side "
@@ -342,9 +340,8 @@ def _solver_sizes(program: Program) -> list[tuple[str, str]]:
 
 
 def _algorithms(program: Program) -> Algorithms:
-    names = tuple(program.intrinsics)
-    texts = dict.fromkeys(name for intrinsic in names for name in ("states", _TEXTS[intrinsic]))
-    return Algorithms(names, tuple(text_of(name) for name in texts), tuple(_solver_sizes(program)))
+    modules = dict.fromkeys(module for a in program.algorithms for module in (_STATES, a.module))
+    return Algorithms(tuple(program.intrinsics), tuple(map(text_of, modules)), tuple(_solver_sizes(program)))
 
 
 def _header(content: Content, program: Program) -> list[str]:

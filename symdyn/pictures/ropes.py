@@ -1,7 +1,7 @@
 """Ropes and mooring lines between two points, as they hang.
 
 A rope has no stiffness: it is straight while it is taut, else the catenary of its length. A mooring line has the shape that its
-load computes, see symdyn.tape.catenary.
+load computes, see symdyn.model.elements.catenary.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from symdyn.tape.algorithms.catenary import symdyn_line_force
-from symdyn.tape.catenary import CLOSE, NEAREST, TINY
+from symdyn.model.algorithms.catenary import SYMDYN_CLOSE, SYMDYN_NEAREST, SYMDYN_TINY, symdyn_line_force
 
 # Shorter than its length by less, of it, is taut; points along a rope.
 _TAUT = 1e-5
@@ -59,8 +58,8 @@ def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float
     Straight where no shape at rest is found, as where the fairlead is below the seabed.
     """
     way = fairlead - anchor
-    x, z = math.hypot(way[0], way[1], 2 * length * NEAREST) / length, float(way[2]) / length
-    result = symdyn_line_force(math, int(seabed), (x, z, give, friction), TINY, CLOSE)
+    x, z = math.hypot(way[0], way[1], 2 * length * SYMDYN_NEAREST) / length, float(way[2]) / length
+    result = symdyn_line_force(math, int(seabed), (x, z, give, friction), SYMDYN_TINY, SYMDYN_CLOSE)
     share = min(1.0, shown / length)
     if result is None:
         return np.asarray(fairlead - np.linspace(0.0, share, POINTS)[:, None] * way)

@@ -1,7 +1,7 @@
 """Numeric algorithms that a tape calls where statements would not do: so many numbers in, so many out.
 
-Generated code calls them by name. Their text in Python is in symdyn.tape.algorithms, for doubles, for many digits, for statements
-on a tape and for generated Python modules; that in C is in templates/c/runtime/NAME.h.
+Generated code calls them by name. Their text in Python is in a module of its own, such as those of symdyn.tape.algorithms, for
+doubles, for many digits, for statements on a tape and for generated Python modules; that in C is in templates/c/runtime/NAME.h.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ class Intrinsic:
     """A numeric algorithm of one size. Subclasses say what is computed.
 
     name     in generated code; sizes: what it is called with
+    module   that holds its text in Python; called_by: what of a model calls it
     reason   what it means if it fails
     letters  what its results are called in print; none where there is no function to read
     """
@@ -55,6 +56,8 @@ class Intrinsic:
     reason: str
 
     name = ""
+    module = ""
+    called_by = ""
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -106,6 +109,8 @@ class Saddle(Intrinsic):
     """
 
     name = "symdyn_saddle"
+    module = "symdyn.tape.algorithms.saddle"
+    called_by = "constraints"
 
     @property
     def n_out(self) -> int:
@@ -159,6 +164,8 @@ class Multipliers(Intrinsic):
     """
 
     name = "symdyn_multipliers"
+    module = "symdyn.tape.algorithms.saddle"
+    called_by = "constraints"
 
     @property
     def n_out(self) -> int:

@@ -65,7 +65,7 @@ function ropeOf(a, b, length, up) {
 }
 
 // The horizontal and the vertical force at the fairlead of a mooring line, over its weight; null where none is found. The algorithm is
-// that of symdyn/tape/algorithms/catenary.py: lengths are over that of the line, e its weight over EA.
+// that of symdyn/model/algorithms/catenary.py: lengths are over that of the line, e its weight over EA.
 function lineForce(x, z, e, friction, seabed) {
     if (seabed && !(z > 0)) return null;
     const hanging = 2 * z / (1 + Math.sqrt(1 + 2 * e * z));

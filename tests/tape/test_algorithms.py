@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from symdyn.backend.source import Content, render
+from symdyn.model.elements.catenary import Catenary
+from symdyn.model.elements.cube import Cube
 from symdyn.tape import Recorder, Tape
-from symdyn.tape.catenary import Catenary
-from symdyn.tape.cube import Cube
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.intrinsics import LOOSE, SMOOTHED, Intrinsic, Multipliers, Saddle
 from symdyn.tape.node import INPUT

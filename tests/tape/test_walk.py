@@ -13,9 +13,9 @@ import sympy as sp
 
 from symdyn.exact.walk import Exact
 from symdyn.formulation.textbook.doubles import Doubles
+from symdyn.model.elements.cube import Cube
 from symdyn.precision.program import program
 from symdyn.tape import Node, Output, Recorder, Tape
-from symdyn.tape.cube import Cube
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.intervals import ZERO, Interval, Jet, enclosures

@@ -13,10 +13,10 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.elements.base import Element
+from symdyn.model.elements.cube import Cube
 from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, vector, zeros
-from symdyn.tape.cube import Cube
 from symdyn.tape.node import is_zero
 
 if TYPE_CHECKING:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.model.algorithms.catenary import SYMDYN_NEAREST
 from symdyn.model.elements.base import Element
+from symdyn.model.elements.catenary import Catenary, potential
 from symdyn.model.elements.checks import not_negative, positive
 from symdyn.model.elements.site import Action, Site, Validity
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, vector
-from symdyn.tape.catenary import NEAREST, Catenary, potential
 from symdyn.tape.node import is_zero
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class MooringLine(Element):
     A fairlead may be straight above or below its anchor, as that of a tension leg is: horizontal distances below 2e-9 of the
     length count as such. The run stops with the reason where the fairlead is not above the seabed; a strain at the fairlead
     above 5 % gives a warning.
-    Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.tape.catenary for the equations.
+    Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.model.elements.catenary for the equations.
 
     >>> system = sd.System("float", gravity=[0, 0, -9.81])
     >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
@@ -84,7 +85,7 @@ class MooringLine(Element):
         fairlead = a.constants(self.fairlead)
         d = site.p + site.R @ fairlead - a.constants(self.anchor)
         # H / distance has a limit where the distance vanishes; the root keeps away from it, and the force stays the gradient.
-        nearest = 2 * length * NEAREST
+        nearest = 2 * length * SYMDYN_NEAREST
         distance = a.sqrt(d[0] * d[0] + d[1] * d[1] + nearest * nearest)
         height = d[2]
         if self.seabed:

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import UnsupportedExpression
-from symdyn.tape.algorithms.cube import symdyn_cut_cube
+from symdyn.model.algorithms.cube import SYMDYN_SHARES, symdyn_cut_cube
 from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.intrinsics import Intrinsic
 
 HIGHEST = 2
-# Gauss points of the unit interval: (1 -+ 1/sqrt(3))/2.
-SHARES = 0.21132486540518713, 0.7886751345948129
 
 
 @dataclass(frozen=True)
@@ -37,6 +35,8 @@ class Cube(Intrinsic):
     """
 
     name = "symdyn_cube"
+    module = "symdyn.model.algorithms.cube"
+    called_by = "sd.Buoyancy"
 
     @property
     def indices(self) -> list[tuple[int, ...]]:
@@ -60,7 +60,7 @@ class Cube(Intrinsic):
         return (150, 150, 450)[self.sizes[0]]
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        result, _ = symdyn_each(lambda e: symdyn_cut_cube(self.sizes[0], e, 1.0, SHARES), self.n_out, values)
+        result, _ = symdyn_each(lambda e: symdyn_cut_cube(self.sizes[0], e, 1.0, SYMDYN_SHARES), self.n_out, values)
         return np.moveaxis(np.array(result), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:

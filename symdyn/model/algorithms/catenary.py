@@ -1,7 +1,9 @@
-"""The force at the upper end of a hanging elastic line; see Catenary in symdyn.tape.catenary."""
+"""The force at the upper end of a hanging elastic line; see Catenary in symdyn.model.elements.catenary."""
 
 # A line that hangs freely has no horizontal force if its ends are as near to one vertical as this part of its length.
 SYMDYN_NEAREST = 1e-9
+# Of doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
+SYMDYN_TINY, SYMDYN_CLOSE = 9e-16, 1e-8
 
 
 def symdyn_line_start(math, seabed, x, z, e):

@@ -12,10 +12,10 @@ import pytest
 
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError, UnsupportedExpression
+from symdyn.model.elements.cube import Cube
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
-from symdyn.tape.cube import Cube
 from symdyn.tape.differentiate import forward, reverse
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows

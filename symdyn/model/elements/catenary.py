@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.tape.algorithms.catenary import SYMDYN_NEAREST, symdyn_line_force
+from symdyn.model.algorithms.catenary import SYMDYN_CLOSE, SYMDYN_TINY, symdyn_line_force
 from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.differentiate import forward
 from symdyn.tape.intrinsics import Intrinsic
@@ -35,9 +35,6 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
 from symdyn.tape.walk import walk
 
-# For doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
-TINY, CLOSE = 9e-16, 1e-8
-NEAREST = SYMDYN_NEAREST
 # Friction below this is none, so that nothing is divided by zero.
 SMOOTH = Fraction(1, 10**12)
 
@@ -50,6 +47,8 @@ class Catenary(Intrinsic):
     """
 
     name = "symdyn_catenary"
+    module = "symdyn.model.algorithms.catenary"
+    called_by = "sd.MooringLine"
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -64,7 +63,7 @@ class Catenary(Intrinsic):
         return 5 * 70
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        result, _ = symdyn_each(lambda line: symdyn_line_force(math, self.sizes[0], line, TINY, CLOSE), 2, values)
+        result, _ = symdyn_each(lambda line: symdyn_line_force(math, self.sizes[0], line, SYMDYN_TINY, SYMDYN_CLOSE), 2, values)
         return np.moveaxis(np.array(result), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:

@@ -1,4 +1,7 @@
-"""Part of the unit cube under water; see Cube in symdyn.tape.cube."""
+"""Part of the unit cube under water; see Cube in symdyn.model.elements.cube."""
+
+# Gauss points of the unit interval: (1 -+ 1/sqrt(3))/2.
+SYMDYN_SHARES = 0.21132486540518713, 0.7886751345948129
 
 
 def symdyn_cut_corner(a, b, s, h, one, shares):

@@ -15,10 +15,10 @@ from scipy.integrate import quad, solve_ivp
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
 from symdyn.exact.prove import zero
+from symdyn.model.elements.catenary import Catenary, potential
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
-from symdyn.tape.catenary import Catenary, potential
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
