@@ -38,25 +38,6 @@ _WRITTEN = {"neg": "-{0}", "not": "!{0}", "select": "{0} ? {1} : {2}", "sign": "
 _TRUTHS = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 _HEAD = "#include <quadmath.h>\ntypedef __float128 quad;\n"
 _LOST = 1
-_MIDPOINT = """
-int symdyn_midpoint(const quad *in, int n, quad *out) {
-    enum { SIZE = %d };
-    const quad t = in[0], h = in[1]/n, *x = in + 2, *begin = x + SIZE;
-    quad before[SIZE], now[SIZE + 1], rate[SIZE];
-    for (int k = 0; k < SIZE; k++) before[k] = x[k], now[k + 1] = x[k] + h*begin[k];
-    for (int i = 1; i < n; i++) {
-        now[0] = t + i*h;
-        if (symdyn_quad(now, rate)) return 1;
-        for (int k = 0; k < SIZE; k++) {
-            const quad next = before[k] + 2*h*rate[k];
-            before[k] = now[k + 1], now[k + 1] = next;
-        }
-    }
-    for (int k = 0; k < SIZE; k++) out[k] = now[k + 1];
-    return 0;
-}
-"""
-
 T = TypeVar("T")
 
 
@@ -149,17 +130,22 @@ def source(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[st
     entries = [texts.of(e) for output in tape.outputs.values() for e in output.entries]
     lines += [f"out[{k}] = {entry};" for k, entry in enumerate(entries)]
     body = "\n".join(f"    {line}" for line in [*lines, "return 0;"])
-    rule = _MIDPOINT % len(entries) if len(entries) == len(free) - 1 else ""
+    rule = f"\n#define SYMDYN_SIZE {len(entries)}\n{_part('quad_midpoint')}" if len(entries) == len(free) - 1 else ""
     called = "".join(map(_intrinsic, sorted(intrinsics)))
     return f"{_HEAD}{called}int symdyn_quad(const quad *x, quad *out) {{\n{body}\n}}\n{rule}"
 
 
 def _intrinsic(name: str) -> str:
     """The text of a numeric algorithm, its doubles made these numbers."""
-    text = re.sub(r"//.*|#.*", "", (templates_folder() / "c" / "runtime" / f"{name}.h").read_text(encoding="utf-8"))
+    text = re.sub(r"//.*|#.*", "", _part(name))
     text = text.replace("SYMDYN_LINKED ", "static ")
     text = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)", lambda m: _FINER.get(m[1], m[1]) + "Q", text)
     return re.sub(r"\b(fabs|sqrt|tanh|log1p)(?=\()", r"\1q", re.sub(r"\bdouble\b", "quad", text))
+
+
+def _part(name: str) -> str:
+    """A part of the runtime in C."""
+    return (templates_folder() / "c" / "runtime" / f"{name}.h").read_text(encoding="utf-8")
 
 
 class _Writer(Arithmetic):
