@@ -22,6 +22,7 @@ from symdyn.runtime.batches import motions
 from symdyn.runtime.batches.motions import unit_of
 from symdyn.runtime.module import Module
 from tests.derivatives.test_sensitivities import common, free_body, three_cranks
+from tests.derivatives.test_sensitivities_at_events import jumping
 
 pytestmark = pytest.mark.native  # tcc has no vectors
 N = 19  # more than two vectors of eight lanes, and some left over
@@ -218,7 +219,8 @@ def test_what_runs_one_by_one(arm: Any, monkeypatch: pytest.MonkeyPatch) -> None
         bounces = falling(reset=True).simulate_batch({"y": [1.0, 2.0]}, t=(0, 1), sensitivities=["g"])
         assert bounces.note == "one by one: with sensitivities, across events that reset states"
         without = falling(reset=True).simulate_batch({"y": [1.0, 2.0]}, t=(0, 1), sensitivities=["g"], events=False)
-    assert without.note == ""
+        jumps = jumping("edge").simulate_batch(params={"k": [1.0, 1.1]}, t=(0, 0.1), sensitivities=["k"])
+    assert without.note == "" and jumps.note == "one by one: with sensitivities, of a right-hand side that may jump"
     monkeypatch.setattr(motions, "MOST_ENTRIES", 11)
     assert arm.simulate_batch(**GROUPS, t=(0, 0.1), sensitivities=["g"]).note == ""
     note = arm.simulate_batch(**GROUPS, t=(0, 0.1), sensitivities=["g", "m2"]).note
