@@ -128,6 +128,7 @@ class Rolled:
         self.arrays = tape.arrays
         self.at_once = taken_at_once(body, dialect)
         self.angles = list(dict.fromkeys(n.args[0] for n in self.at_once))
+        self.steps: list[Any]
         self.steps, self.at = self._in_order()
         # Where the steps of the tape stand among what is read; the last one is that of numbers.
         self._numbers = np.full(len(self.arrays.steps) + 1, -1)
@@ -135,6 +136,7 @@ class Rolled:
         self._numbers[-1] = -1
         self.read: list[Any] = list(self.steps)
         self.groups: list[str] = [_STEP] * len(self.steps)
+        self.place = np.full(len(self.steps), -1)
         kinds = self._look()
         sections = [step.section for step in self.steps]
         begins = [k + 1 for k, (one, other) in enumerate(pairwise(sections)) if one != other]
@@ -251,7 +253,7 @@ class Rolled:
         self.read += [self.arrays.steps[k] for k in outside]
         groups = [self._group(self.arrays.steps[k], sines) for k in outside]
         self.groups += [group for group, _ in groups]
-        self.place = np.array([*[-1] * len(self.steps), *(place for _, place in groups)], dtype=np.int64)
+        self.place = np.concatenate([self.place, np.array([place for _, place in groups], dtype=np.int64)])
         return self._numbers[cores]
 
     def _group(self, core: Any, sines: Mapping[Node, int]) -> tuple[str, int]:
