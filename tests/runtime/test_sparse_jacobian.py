@@ -124,6 +124,29 @@ def test_sag_and_frequencies_converge_to_closed_forms() -> None:
     assert (4 * found[1] - found[0]) / 3 == pytest.approx(exact, rel=1e-4)
 
 
+def test_shapes_with_deep_sag_converge_to_the_elastic_catenary() -> None:
+    deep = {n: stiff_cables._deep(n) for n in (20, 40)}
+    for k, exact in ((0, stiff_cables.DEEP), (1, 0.0)):
+        coarse, fine = (deep[n][k] - exact for n in (20, 40))
+        assert fine == pytest.approx(coarse / 4, rel=0.02) and 0 < fine < 1e-3
+    # Without stretch it is a hyperbolic cosine through both supports.
+    H, rest = stiff_cables.deep_catenary(0.3, 1e13)
+    x, y = stiff_cables.hanging(H, rest, 1e13, np.linspace(0, 1, 9))
+    a = H * rest / stiff_cables.WEIGHT
+    assert y == pytest.approx(a * (np.cosh((x - 0.5) / a) - np.cosh(0.5 / a)), abs=1e-11) and y.min() == pytest.approx(-0.3)
+    assert rest == pytest.approx(2 * a * np.sinh(0.5 / a), rel=1e-11) and x[-1] == pytest.approx(1, rel=1e-14)
+
+
+def test_errors_of_cables_of_links_are_of_second_order(capsys: pytest.CaptureFixture[str]) -> None:
+    """Those of their shapes and of their frequencies, whose limit is nearer to the closed form."""
+    few, many = stiff_cables.compare(30), stiff_cables.compare(60)
+    for name in ("shape_error", "deep_shape_error", "sag_error", "deep_sag_error"):
+        assert getattr(many, name) == pytest.approx(getattr(few, name) / 4, rel=0.03), name
+    own, limit = np.array(many.own_errors), np.array(many.limit_errors)
+    assert own == pytest.approx(np.array(few.own_errors) / 4, rel=0.05) and (limit < own / 10).all()
+    assert len(stiff_cables.compare(10).limit) == 4 and few.bounded[-5:] == few.limit_errors
+
+
 def test_shapes_that_are_not_found_raise(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NoEquilibrium, match=r"^elastic_cable_12: .* step 1 the stiffness of the 22 coordinates is singular"):
         at_rest(elastic_cable(12, tension=0.0).embedding().compile(backend="numpy"))
