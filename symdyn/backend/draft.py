@@ -108,9 +108,9 @@ class Drafts:
             part = writer.part(self._ordered(draft, draft.body, entries), entries, writer.results_of(entries), draft.checks)
             return made(part.arguments, part.loads, part.sections, part.results, inlined=frozenset(writer.printer.inline))
         beginning = beginning or Beginning()
-        parts, _, n_w, inlined = self._parts(draft, beginning, ())
+        parts, _, n_w, inlined = self._parts(draft, beginning, set())
         inlined = inlined.union(*[f.inlined for f in beginning.calls])
-        groups = {g for called in (*parts, *beginning.calls) for g in called.arguments}
+        groups = {g for arguments in (*[f.arguments for f in beginning.calls], *[part.arguments for part in parts]) for g in arguments}
         return made(tuple(g for g in ARGUMENTS if g in groups), (), (), (), parts=tuple(parts), n_w=n_w, calls=beginning.calls,
                     inlined=inlined)
 

@@ -125,7 +125,7 @@ class CompiledSolver(OdeSolver):
         if self.module.metadata.compliant or self.module.metadata.contacts:
             check_contact_numbers(self.module, t0, start, of.p, free.at(t0, start))
         self.request = request = self._request(free, (t0, t_bound), start, rtol, atol, max_step, first_step)
-        check_compiled(self.module, request, of.method)
+        check_compiled(self.module, request.inputs, of.method)
         request = replace(request, stabilization=stabilization_of(self.module, request, of.method, of.stabilization))
         by_gain = request.stabilization.way == "baumgarte"
         if by_gain:
