@@ -110,7 +110,7 @@ class Drafts:
         beginning = beginning or Beginning()
         parts, _, n_w, inlined = self._parts(draft, beginning, set())
         inlined = inlined.union(*[f.inlined for f in beginning.calls])
-        groups = {g for arguments in (*[f.arguments for f in beginning.calls], *[part.arguments for part in parts]) for g in arguments}
+        groups = {g for called in beginning.calls for g in called.arguments} | {g for part in parts for g in part.arguments}
         return made(tuple(g for g in ARGUMENTS if g in groups), (), (), (), parts=tuple(parts), n_w=n_w, calls=beginning.calls,
                     inlined=inlined)
 
