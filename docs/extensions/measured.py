@@ -36,6 +36,8 @@ COMMANDS = {
     "sweep": "symdyn bench sweep",
     "growth": "symdyn bench growth",
     "rolled": "symdyn bench rolled",
+    "bridges": "symdyn bench bridges --sizes 20 35",
+    "nets": "symdyn bench nets",
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
     "optimize": "symdyn bench optimize",
