@@ -36,7 +36,7 @@ COMMANDS = {
     "sweep": "symdyn bench sweep",
     "growth": "symdyn bench growth",
     "rolled": "symdyn bench rolled",
-    "bridges": "symdyn bench bridges --sizes 20 35",
+    "bridges": "symdyn bench bridges --sizes 20 50",
     "nets": "symdyn bench nets",
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
