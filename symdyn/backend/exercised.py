@@ -176,8 +176,8 @@ def singular_states(tape: Tape, values: Mapping[str, np.ndarray], n: int, known:
         above, below = (np.flatnonzero(side) for side in (divisor > 0, divisor < 0))
         if above.size and below.size:
             divisors.append(node.args[0])
-            first.append(above[0])
-            second.append(below[0])
+            first.append(int(above[0]))
+            second.append(int(below[0]))
     alone, each = Tape.of(tape.recorder, divisors=divisors), np.arange(len(divisors))
 
     def signs(points: Mapping[str, np.ndarray]) -> np.ndarray:
