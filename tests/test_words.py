@@ -66,9 +66,19 @@ def _of_module(text: str) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in documented and not tests:
             yield from ((node.lineno, line) for line in node.value.splitlines() if " " in line)
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT:
-            yield token.start[0], token.string
+    for k, line in enumerate(lines, 1):
+        if "#" in line:
+            yield from _comment(k, line)
+
+
+def _comment(number: int, line: str) -> Iterator[tuple[int, str]]:
+    """The comment of a line of Python by itself; a line within a text of several may be none, and is then read as if it were."""
+    try:
+        tokens = list(tokenize.generate_tokens(io.StringIO(line.strip() + "\n").readline))
+    except (tokenize.TokenError, SyntaxError):
+        yield number, line.partition("#")[2]
+        return
+    yield from ((number, token.string) for token in tokens if token.type == tokenize.COMMENT)
 
 
 def _outside_code(lines: list[str]) -> Iterator[tuple[int, str]]:

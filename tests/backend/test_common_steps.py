@@ -18,7 +18,7 @@ from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape import Recorder
 from symdyn.tape.node import COORDINATE
-from symdyn.tape.tape import reachable, unsigned
+from symdyn.tape.tape import Tape, reachable, unsigned
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 FUNCTIONS = ("rhs", "position_correction", "velocity_correction", "length")
@@ -86,7 +86,8 @@ def test_places_of_what_is_there_before_are_used_again_once_it_has_been_read() -
     for other in first[:30:5]:
         node = recorder.cos(node * other)
         later.append(node)
-    stretches, slots, count = divide(begun, (), 10, later={*kept, last})
+    arrays = Tape.of(recorder, y=[node]).arrays
+    stretches, slots, count = divide(arrays, begun, (), 10, later={*kept, last})
     held: dict[int, Any] = {}
 
     def run(stretches: Any, slots: Any) -> None:
@@ -102,7 +103,7 @@ def test_places_of_what_is_there_before_are_used_again_once_it_has_been_read() -
     assert all(held[slots[n]] is n for n in (*kept, last))
     before = {n: slots[n] for n in (*kept, last)}
     own = [n for n in steps_of(node) if n not in set(begun)]
-    more, places, size = divide(own, [node], 3, before, count)
+    more, places, size = divide(arrays, own, [node], 3, before, count)
     run(more, places)
     assert size == count and len({*places.values()}) <= count < len(places) + len(begun)
     assert all(places[n] == slots[n] for n in before if n in places)
