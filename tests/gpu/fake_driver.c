@@ -39,7 +39,7 @@ int cuDeviceGetAttribute(int *value, int which, int device) {
     *value = which == 75 ? 9 : which == 76 ? 0 : which == 16 ? 2 : which == 39 ? 2048 : -1;
     return device || *value < 0 ? INVALID : OK;
 }
-int cuMemGetInfo_v2(size_t *left, size_t *total) { return *left = *total = (size_t)1 << 28, OK; }
+int cuMemGetInfo_v2(size_t *left, size_t *total) { return *left = *total = (size_t)1 << 30, OK; }
 int cuMemAlloc_v2(unsigned long long *address, size_t size) {
     *address = (unsigned long long)malloc(size);
     n_blocks++;

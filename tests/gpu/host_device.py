@@ -96,3 +96,62 @@ class HostDevice:
     def _inside(self, address: int, size: int) -> None:
         """What is copied lies within one block."""
         assert any(start <= address and address + size <= start + ctypes.sizeof(block) for start, block in self.blocks.items())
+
+
+# The threads of a launch side by side: warps take turns, and so do the threads of a warp. rounds: of every warp until its last
+# thread has ended, of every thread, each summed up.
+LOCKSTEP = """
+SYMDYN_EXPORT void lockstep(symdyn_motions motions, long threads, long warp, void *memory, long *turns, long *rounds) {
+    symdyn_motion *const own = (symdyn_motion *)memory;
+    for (long k = 0; k < threads; k++) own[k].i = -1;
+    for (int going = 1; going;) {
+        going = 0;
+        for (long first = 0; first < threads; first += warp) {
+            int waits = 0;
+            for (long k = first; k < threads && k < first + warp; k++) {
+                if (turns[k] == LONG_MIN) continue;
+                going = waits = 1;
+                rounds[1]++;
+                if (!symdyn_advance(&motions, own + k, turns + k)) turns[k] = LONG_MIN;
+            }
+            if (waits) rounds[0]++;
+        }
+    }
+}
+"""
+
+
+class Lockstep(HostDevice):
+    """A device whose warps of 32 threads attempt their steps together.
+
+    launches   kernels of motions that were begun, by their number of motions
+    rounds     of warps, and of threads, until these had ended
+    """
+
+    WARP = 32
+
+    def __init__(self, threads: int) -> None:
+        super().__init__(threads=threads)
+        self.launches: list[int] = []
+        self.rounds = np.zeros(2, dtype=int)
+
+    def kernel(self, text: str, name: str, function: str) -> Any:
+        self.library: Any = cache.load("#include <limits.h>\n" + text + LOCKSTEP, name, require_compiler())
+        kernel = getattr(self.library, function)
+        if function.endswith("_motion_size"):
+            self.motion_size = kernel
+        return kernel
+
+    def launch(self, stream: list[Any], kernel: Any, threads: int, argument: Any) -> None:
+        if not argument.n:  # asks for the size of a motion
+            super().launch(stream, kernel, threads, argument)
+            return
+        copied = type(argument).from_buffer_copy(argument)
+        self.launches.append(argument.n)
+        size = np.zeros(1, dtype=np.intc)
+        self.motion_size(type(argument)(n_put=size.ctypes.data))
+        memory, turns = np.zeros((threads, size[0]), dtype=np.uint8), np.full(threads, argument.turn)
+        address = ctypes.c_void_p
+        stream.append(lambda: self.library.lockstep(
+            copied, ctypes.c_long(threads), ctypes.c_long(self.WARP), address(memory.ctypes.data), address(turns.ctypes.data),
+            address(self.rounds.ctypes.data)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import itertools
 import os
 import re
 import shutil
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from host_device import HostDevice, compiled
+from host_device import HostDevice, Lockstep, compiled
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
@@ -37,7 +38,7 @@ from symdyn.lab import gpu
 from symdyn.lab.stiff_cables import elastic_cable
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.gpu import compiling, device
+from symdyn.runtime.gpu import compiling, device, motions
 from symdyn.runtime.gpu.motions import Motions
 from symdyn.runtime.solutions.states_only import NOT_KEPT
 from tests.helpers import swept
@@ -78,6 +79,79 @@ def test_chunks_are_begun_before_the_ones_before_are_copied_back(host: HostDevic
     # Two are under way at any time, but for the first and the last one.
     under_way = np.cumsum([1 if what == "begin" else -1 for what, _ in works])
     assert under_way.max() == 2 and (under_way[1:-1] >= 1).all() and under_way[-1] == 0
+
+
+def uneven(n: int) -> dict[str, Any]:
+    """Double pendulums of lengths from 1 cm to 1 m, whose motions differ by a factor of ten in their steps."""
+    lengths = 10 ** np.random.default_rng(1).uniform(-2, 0, n)
+    return {"q": {"q1": 1.0, "q2": 0.2}, "params": {"l1": lengths, "lc1": lengths, "lc2": lengths}, "t": [0, 4, 8]}
+
+
+def in_warps(monkeypatch: pytest.MonkeyPatch, threads: int = 256) -> Lockstep:
+    made = Lockstep(threads)
+    monkeypatch.setattr(device, "open_device", lambda number, owner: made)
+    return made
+
+
+@pytest.mark.parametrize(("rounds", "kept", "gathered"), [(1, 1.9, 1.35), (2, 1.5, 1.15), (4, 1.2, 1.08)])
+def test_motions_that_are_left_are_gathered_in_few_warps(monkeypatch: pytest.MonkeyPatch, rounds: int, kept: float,
+                                                         gathered: float) -> None:
+    """Steps that warps have room for, 32 a round, compared with those of all motions; for each thread so many motions."""
+    module, asked = compiled("double_pendulum"), uneven(rounds * 256)
+    here = module.simulate_batch(**asked)
+    steps = here.n_steps + here.n_rejected
+    assert 8 < steps.max() / steps.min() < 12
+    regrouped, room = in_warps(monkeypatch), 32 / steps.sum()
+    same(module.simulate_batch(**asked, device="gpu"), here)
+    assert regrouped.launches[0] == rounds * 256 and len(regrouped.launches) > 4
+    assert all(256 >= a >= b for a, b in itertools.pairwise(regrouped.launches[1:]))
+    assert regrouped.rounds[0] * room < gathered and not regrouped.blocks
+    # Where there is no memory for motions that are put down, threads keep theirs, and warps wait for the longest one.
+    monkeypatch.setattr(motions, "SHARE_PUT", 0.0)
+    plain = in_warps(monkeypatch)
+    same(module.simulate_batch(**asked, device="gpu"), here)
+    assert plain.launches == [rounds * 256] and plain.rounds[0] * room > kept
+    assert plain.rounds[1] == regrouped.rounds[1]  # the same attempts of threads
+
+
+@pytest.mark.parametrize(("name", "more"), [
+    ("double_pendulum", {"method": "radau"}), ("double_pendulum", {"method": "gauss"}), ("double_pendulum", {"method": "taylor"}),
+    ("double_pendulum", {"method": "bs54"}), ("cart_pole", {"inputs": True}), ("four_bar", {}), ("ball", {})])
+def test_motions_that_are_put_down_go_on_to_the_same_bits(monkeypatch: pytest.MonkeyPatch, name: str,
+                                                          more: dict[str, Any]) -> None:
+    module = ball(True) if name == "ball" else compiled(name)
+    monkeypatch.setattr(motions, "TURN", 2)
+    first = {"ball": {"q": {"y": np.linspace(1, 2, 40)}},
+             "four_bar": {"params": {module.metadata.parameters[0]: module.default_parameters[0] * np.linspace(1, 1.1, 40)}}}
+    asked: dict[str, Any] = {**first.get(name, {"q": {module.metadata.q[-1]: np.linspace(0.1, 1, 40)}}), **more,
+                             "t": [0, 0.3, 3 if name == "ball" else 0.5]}
+    if "inputs" in more:
+        asked["inputs"] = {module.metadata.inputs[0]: ([0.0, 0.2, 0.5], [0.0, 3.0, -2.0])}
+    regrouped = in_warps(monkeypatch)
+    there = module.simulate_batch(**asked, device="gpu")
+    assert len(regrouped.launches) > 2 and there.success.any()
+    same(there, module.simulate_batch(**asked))
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_an_interrupt_between_turns_keeps_the_motions_of_the_chunk(monkeypatch: pytest.MonkeyPatch, begun: bool) -> None:
+    """Also one that comes after a turn has begun and before that is known."""
+    module, asked = compiled("double_pendulum"), uneven(256)
+    regrouped = in_warps(monkeypatch)
+    launch, left = regrouped.launch, iter([False, False, False, True])
+
+    def interrupted(*arguments: Any) -> None:
+        stop = next(left, False)
+        if begun or not stop:
+            launch(*arguments)
+        if stop:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(regrouped, "launch", interrupted)
+    with pytest.raises(SimulationInterrupted, match="interrupted after 256 of 256 motions") as caught:
+        module.simulate_batch(**asked, device="gpu")
+    same(caught.value.solution, module.simulate_batch(**asked))
+    assert not regrouped.blocks and next(left, None) is None
 
 
 def test_memory_of_the_device_is_bounded(host: HostDevice) -> None:
@@ -241,8 +315,6 @@ def test_euler_parameters_keep_their_length(host: HostDevice) -> None:
 
 
 def test_long_motions_go_on_on_the_processor(host: HostDevice, monkeypatch: pytest.MonkeyPatch) -> None:
-    from symdyn.runtime.gpu import motions
-
     monkeypatch.setattr(motions, "MOST_STEPS", 20)
     module, asked = compiled("double_pendulum"), swings(12)
     there, here = module.simulate_batch(**asked, t=(0, 2), device="gpu"), module.simulate_batch(**asked, t=(0, 2))
@@ -348,7 +420,7 @@ def test_an_inconsistent_start_is_a_failure_with_what_to_do(host: HostDevice) ->
 KILLED = """
 import os, signal, sys
 sys.path.insert(0, {here!r})
-from host_device import HostDevice, compiled
+from host_device import HostDevice, Lockstep, compiled
 import symdyn as sd
 from symdyn.runtime.gpu import device
 
@@ -501,7 +573,7 @@ def test_the_drivers_calls(tmp_path: Path) -> None:
     program = """
 import ctypes, numpy as np, symdyn as sd
 module = sd.systems.get("double_pendulum").compile(backend="c")
-asked = {"q": {"q1": np.linspace(-1, 1, 9000), "q2": 0.2}, "t": (0, 0.1)}
+asked = {"q": {"q1": np.linspace(-1, 1, 9000), "q2": 0.2}, "t": (0, 1)}
 there, here = module.simulate_batch(**asked, device="gpu"), module.simulate_batch(**asked)
 assert np.array_equal(there.x, here.x) and there.success.all()
 print(there.note)
@@ -519,5 +591,6 @@ except sd.ArgumentError as error:
     note, counts, error = done.stdout.splitlines()
     assert note.startswith("on Fake 0, 4096 at once, ") and not done.stderr
     assert note.endswith(", 12.6 MB (12648448 bytes) of these for stacks of threads")  # 3088 bytes of 4096 threads
-    assert counts == "0 0 0 1"  # blocks, modules and streams are given back; one kernel ran
+    # Blocks, modules and streams are given back. Kernels: the size of a motion, all motions, the last one that was put down.
+    assert counts == "0 0 0 3"
     assert error == "double_pendulum: device='gpu:1' was asked for; there are 1, numbered from 0"

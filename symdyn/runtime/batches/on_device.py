@@ -16,7 +16,7 @@ from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states_on_device import device_kernel
 from symdyn.runtime.batches.together import Asked, Together
 from symdyn.runtime.gpu import device as devices
-from symdyn.runtime.gpu.motions import MOST_STEPS, Work, integrate
+from symdyn.runtime.gpu.motions import MOST_STEPS, MotionKernels, Work, integrate
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.methods import unfit
 from symdyn.runtime.integrating.run_record import SingleReport
@@ -42,18 +42,19 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
     try:
         library: Any = module.library(RightSide(method=method, threads=True, looks=asked.looks,
                                              single=precision == "single"))
-        kernel = device_kernel(module, device, library.source, f"{library.metadata.name}_motions")
+        kernels = MotionKernels(*(device_kernel(module, device, library.source, f"{library.metadata.name}_{what}")
+                                  for what in ("motions", "motion_size")))
         motions = Together(module, asked)
         work = Work(motions.starts, asked.inputs, motions.params, motions.lengths, motions.span, asked.atol, asked.times,
                     projects(module), motions.pieces, motions.stops, motions.look, asked.event_spacing, motions.taken_after,
                     *_results(motions, precision), motions.doubts)
         interrupted, note = False, ""
         try:
-            note = integrate(device, kernel, work, module.name)
+            note = integrate(device, kernels, work, module.name)
         except KeyboardInterrupt:
             interrupted = True
         _take(motions, work)
-        return motions.solution(library, device.at_once(kernel), note, interrupted, MOST_STEPS, alone)
+        return motions.solution(library, device.at_once(kernels.motions), note, interrupted, MOST_STEPS, alone)
     finally:
         device.close()
 

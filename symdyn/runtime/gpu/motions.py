@@ -23,6 +23,11 @@ ROUNDS = 4
 # Attempted steps of a motion, at most: a kernel cannot be interrupted. What takes more goes on on the processor.
 MOST_STEPS = 1_000_000
 ALIGNED = 256
+# Threads that attempt their steps together. Where there are more, and all motions have been taken, those under way are put down
+# after so many attempts and gathered in as few warps; every time they take a quarter more attempts, and the last time any number.
+# What is put down takes no more than this share of the memory that is free.
+WARP = 32
+TURN, TURNS, SHARE_PUT = 32, 64, 0.1
 
 
 class Motions(ctypes.Structure):
@@ -85,25 +90,41 @@ class Work:
 
 @dataclass
 class _Slot:
-    """Memory of the device for one chunk, with its stream."""
+    """Memory of the device for one chunk, with its stream.
+
+    counters   two of every turn: how many motions threads have taken, and put down
+    put        where they are put down, turn by turn; empty: threads keep their motions
+    turn       the one that was begun last
+    """
 
     stream: Any
     given: list[int]
     results: list[int]
     tables: int
-    counter: int
+    counters: int
+    put: list[int]
+    turn: int = 0
+    argument: Motions | None = None
     rows: range | None = None
     kept: list[np.ndarray] = field(default_factory=list)
 
 
-def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
+@dataclass(frozen=True)
+class MotionKernels:
+    """The functions `motions` and `motion_size` of a mechanism on a device."""
+
+    motions: Any
+    motion_size: Any
+
+
+def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) -> str:
     """Fill the results of some motions; returns what it took of the device, in words.
 
-    kernel   the function `motions` of the mechanism on that device
     Raises NoDevice where not even a few motions fit into the memory. After a KeyboardInterrupt what is under way is waited
     for; chunks that were not begun keep their results as they were.
     """
-    n, threads = len(work.x), device.at_once(kernel)
+    n, kernel = len(work.x), kernels.motions
+    threads = device.at_once(kernel)
     times = [np.ascontiguousarray(a, dtype=float) for a in (work.span, work.times)]
     pieces = (np.zeros(0), np.zeros(0)) if work.pieces is None else (work.pieces.breaks, work.pieces.coefficients)
     fixed = [*times, *(np.ascontiguousarray(a, dtype=work.dtype) for a in (work.atol, work.stops, *pieces))]
@@ -111,7 +132,11 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
     # One row for all is copied once a slot.
     around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
     free, stacks = device.free(), device.stacks(kernel)
-    around += stacks
+    lanes = min(n, threads)
+    put = lanes * _motion_size(device, kernels.motion_size) if lanes > WARP else 0
+    if 2 * SLOTS * put > SHARE_PUT * free:
+        put = 0
+    around += stacks + 2 * SLOTS * put
     most = (int(SHARE * free) - around) // SLOTS // work.bytes_each()
     if most < 1:
         raise NoDevice(f"{owner}: {device.name} has {in_bytes(free)} of free memory, of which two motions with "
@@ -129,13 +154,14 @@ def integrate(device: Device, kernel: Any, work: Work, owner: str) -> str:
         places = [allocated(a.nbytes) for a in fixed]
         slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * work.dtype.itemsize) for a in work.given],
                        [allocated(size * a[:1].nbytes) for a in work.results],
-                       allocated(len(work.given) * ctypes.sizeof(Table)), allocated(ctypes.sizeof(ctypes.c_int)))
+                       allocated(len(work.given) * ctypes.sizeof(Table)), allocated(TURNS * 2 * ctypes.sizeof(ctypes.c_int)),
+                       [allocated(put), allocated(put)] if put else [])
                  for _ in range(min(SLOTS, -(-n // size)))]
         for index, values in zip(places, fixed, strict=True):
             device.upload(slots[0].stream, index, values)
         device.wait(slots[0].stream)  # the other stream would not
         in_turns(parts_of(n, size), slots, lambda slot, rows: _begin(device, kernel, work, slot, places, rows, threads),
-                 lambda slot: _collect(device, work, slot))
+                 lambda slot: _collect(device, kernel, work, slot))
     finally:
         for address in taken:
             device.release(address)
@@ -153,25 +179,73 @@ def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[in
         device.upload(slot.stream, address, mine)
         slot.kept.append(mine)
     headers = np.frombuffer(bytes(tables), dtype=np.uint8)
-    for values, address in ((headers, slot.tables), (np.zeros(1, dtype=np.intc), slot.counter)):
+    for values, address in ((headers, slot.tables), (np.zeros((TURNS, 2), dtype=np.intc), slot.counters)):
         device.upload(slot.stream, address, values)
         slot.kept.append(values)
     span, times, atol, stops, breaks, coefficients, look = places
-    argument = Motions(
+    slot.turn, slot.argument = 0, Motions(
         n=n, n_out=len(work.times), max_steps=MOST_STEPS, given=slot.tables, span=span, atol=atol, t_out=times,
         n_pieces=0 if work.pieces is None else len(work.pieces.coefficients), breaks=breaks, pieces=coefficients,
         n_stops=len(work.stops), stops=stops, project=int(work.project), look=look if len(work.look) else None,
         event_spacing=work.event_spacing, events_taken_after=work.taken_after, x_out=slot.results[0], states=slot.results[1],
-        reports=slot.results[2], doubts=slot.results[3], next=slot.counter)
-    device.launch(slot.stream, kernel, min(threads, n), argument)
+        reports=slot.results[2], doubts=slot.results[3])
+    _launch(device, kernel, slot, 0, min(threads, n))
     slot.rows = rows
 
 
-def _collect(device: Device, work: Work, slot: _Slot) -> None:
+def _launch(device: Device, kernel: Any, slot: _Slot, turn: int, threads: int) -> None:
+    """Begin a turn of a chunk; an interrupt before it is known to have begun may lead to a second call, which changes nothing."""
+    assert slot.argument is not None
+    argument = Motions.from_buffer_copy(slot.argument)
+    number = ctypes.sizeof(ctypes.c_int)
+    argument.next = slot.counters + 2 * turn * number
+    argument.n_put = argument.next + number
+    if turn:
+        argument.n, argument.resumed = threads, slot.put[(turn - 1) % 2]
+    if slot.put and turn < TURNS - 1:
+        argument.turn, argument.put = int(TURN * 1.25**turn), slot.put[turn % 2]
+    device.launch(slot.stream, kernel, threads, argument)
+    slot.turn = turn
+
+
+def _motion_size(device: Device, kernel: Any) -> int:
+    """Bytes of a motion that a thread puts down."""
+    size, stream, address = np.zeros(1, dtype=np.intc), device.stream(), device.allocate(ALIGNED)
+    try:
+        device.launch(stream, kernel, 1, Motions(n_put=address))
+        device.download(stream, size, address)
+        device.wait(stream)
+    finally:
+        device.release(address)
+    return int(size[0])
+
+
+def _regroup(device: Device, kernel: Any, slot: _Slot) -> None:
+    """Go on with the motions of a chunk that were put down, until there are none."""
+    counts = np.zeros((TURNS, 2), dtype=np.intc)
+    while True:
+        device.download(slot.stream, counts, slot.counters)
+        device.wait(slot.stream)
+        left = int(counts[slot.turn, 1])
+        if not left:
+            return
+        _launch(device, kernel, slot, slot.turn + 1, left)
+
+
+def _collect(device: Device, kernel: Any, work: Work, slot: _Slot) -> None:
     """Copy the results of a chunk back, when they are there."""
     if slot.rows is None:
         return
+    stopped = None
+    if slot.put:
+        try:
+            _regroup(device, kernel, slot)
+        except KeyboardInterrupt as interrupt:
+            stopped = interrupt
+            _regroup(device, kernel, slot)
     part, slot.rows = slice(slot.rows.start, slot.rows.stop), None
     for values, address in zip(work.results, slot.results, strict=True):
         device.download(slot.stream, values[part], address)
     device.wait(slot.stream)
+    if stopped is not None:
+        raise stopped

@@ -22,4 +22,10 @@ typedef struct {
     symdyn_report *reports;
     int *doubts;  // of every trajectory, see dropped_events.h
     int *next;    // the first trajectory that no thread has taken
+    // Attempts of a thread after all trajectories have been taken, until it puts its own down; 0: any number. What was put down,
+    // and how many; what was put down before, which are the n trajectories; 0: they begin.
+    long turn;
+    void *put;
+    int *n_put;
+    const void *resumed;
 } symdyn_motions;
