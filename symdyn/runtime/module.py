@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     # Values of all inputs in one of these ways, or one for each by name.
     InputValues: TypeAlias = (Row | Table | tuple[Row, Row | Sequence[Row]] | Callable[[float, np.ndarray], float | Row] | Sampled
                               | Named[InputValue] | Numbers)
+    # Numbers of many motions, also in arrays of other libraries on a GPU.
+    OfMany: TypeAlias = Values | OnDevice | Named[OnDevice] | Named[float | Row | OnDevice]
     # Of coordinates by name or symbol: least and most, or r for (-r, r).
     Ranges: TypeAlias = Named[float] | Named[tuple[float, float]] | Named[float | tuple[float, float]]
     # A state: in order, by name or symbol, as (q, u), or with all that belongs to it.
@@ -816,9 +818,9 @@ class Module:
                         max_step=max_step, first_step=first_step, stabilization=stabilization, events=events,
                         interpolation=interpolation, extend=extend)
 
-    def simulate_batch(self, q: Values | None = None, u: Values | None = None,
-                       params: Values | None = None, *, z: Values | None = None, t: Row | None = None,
-                       inputs: InputValues | None = None, rtol: float = 1e-8, atol: float | Row | None = None,
+    def simulate_batch(self, q: OfMany | None = None, u: OfMany | None = None,
+                       params: OfMany | None = None, *, z: OfMany | None = None, t: Row | None = None,
+                       inputs: InputValues | OfMany | None = None, rtol: float = 1e-8, atol: float | Row | None = None,
                        max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
                        max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
@@ -838,10 +840,12 @@ class Module:
         sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions; see `BatchSolution.sensitivity`
 
         device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
-                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits
+                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits. Arrays of JAX, CuPy and
+                    PyTorch (any that has `__dlpack__`) that lie there, of starts, parameters or inputs, are read there, and
+                    states stay there: `BatchSolution.x_on_device`, which `x` copies at its first use
 
-        precision   of the device: "double", or "single": float32, with rtol from 1e-6 on, compensated sums over steps, times in
-                    doubles; without constraints and events, by explicit methods
+        precision   of the device, and of arrays there: "double", or "single": float32, with rtol from 1e-6 on, compensated sums
+                    over steps, times in doubles; without constraints and events, by explicit methods
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, projections onto constraints, events with resets and inputs by tables included, by `dop853` or `bs54`,

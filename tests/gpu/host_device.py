@@ -19,10 +19,25 @@ def compiled(name: str) -> Any:
     return sd.systems.get(name).compile(backend="c")
 
 
+class There:
+    """An array that is on the device, as other libraries have them."""
+
+    def __init__(self, values: np.ndarray, where: tuple[int, int] = (1, 0)) -> None:
+        self.values, self.where = values, where
+
+    def __dlpack__(self, stream: Any = None) -> Any:
+        assert stream is None  # of the processor
+        return self.values.__dlpack__()
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return self.where
+
+
 class HostDevice:
     """Memory are buffers of this process. What a stream is given is done when it is waited for, as late as a GPU may do it.
 
     memory    bytes that there are; threads: that are held at once; stack: bytes that each of them is said to take
+    lent      arrays of others, which may be copied from
     log       what was done: ("begin", n), ("end", n) of kernels, ("up", bytes), ("down", bytes)
     """
 
@@ -35,6 +50,7 @@ class HostDevice:
         self.log: list[tuple[str, int]] = []
         self.most = 0
         self.closed = False
+        self.lent: list[np.ndarray] = []
 
     def free(self) -> int:
         return self.memory - sum(ctypes.sizeof(b) for b in self.blocks.values())
@@ -69,7 +85,9 @@ class HostDevice:
         stream.append(lambda: self._copy("up", address, values.ctypes.data, values.nbytes))
 
     def download(self, stream: list[Any], values: np.ndarray, address: int) -> None:
-        self._inside(address, values.nbytes)
+        lent = [np.lib.array_utils.byte_bounds(a) for a in self.lent]
+        if not any(start <= address and address + values.nbytes <= end for start, end in lent):
+            self._inside(address, values.nbytes)
         assert values.flags.c_contiguous
         stream.append(lambda: self._copy("down", values.ctypes.data, address, values.nbytes))
 

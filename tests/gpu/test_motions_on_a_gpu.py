@@ -577,6 +577,17 @@ asked = {"q": {"q1": np.linspace(-1, 1, 9000), "q2": 0.2}, "t": (0, 1)}
 there, here = module.simulate_batch(**asked, device="gpu"), module.simulate_batch(**asked)
 assert np.array_equal(there.x, here.x) and there.success.all()
 print(there.note)
+x = np.random.default_rng(1).uniform(-1, 1, (9000, 4))
+class There:
+    def __dlpack__(self, stream):
+        assert stream > 2  # no default stream
+        return x[:, 1:3].__dlpack__()
+    def __dlpack_device__(self):
+        return 2, 0
+kept = module.simulate_batch(There(), t=(0, 0.1), device="gpu")
+assert kept.x_on_device.__dlpack_device__() == (2, 0)
+assert np.array_equal(kept.x, module.simulate_batch(x[:, 1:3], t=(0, 0.1)).x)
+del kept
 counts = (ctypes.c_longlong * 4)()
 ctypes.CDLL("libcuda.so.1").fake_counts(counts)
 print(*counts)
@@ -591,6 +602,7 @@ except sd.ArgumentError as error:
     note, counts, error = done.stdout.splitlines()
     assert note.startswith("on Fake 0, 4096 at once, ") and not done.stderr
     assert note.endswith(", 12.6 MB (12648448 bytes) of these for stacks of threads")  # 3088 bytes of 4096 threads
-    # Blocks, modules and streams are given back. Kernels: the size of a motion, all motions, the last one that was put down.
-    assert counts == "0 0 0 3"
+    # Blocks, modules and streams are given back. Kernels: the size of a motion, all motions, the last one, which was
+    # put down; the first two again.
+    assert counts == "0 0 0 5"
     assert error == "double_pendulum: device='gpu:1' was asked for; there are 1, numbered from 0"

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from host_device import HostDevice, compiled
+from host_device import HostDevice, There, compiled
 
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
@@ -30,20 +30,6 @@ HERE = Path(__file__).parent
 N = 50
 # A norm-wise bound of errors in single precision, whose rounding is 6e-8, for states of the size 1.
 SINGLE = 2e-5
-
-
-class There:
-    """An array that is on the device, as other libraries have them."""
-
-    def __init__(self, values: np.ndarray) -> None:
-        self.values = values
-
-    def __dlpack__(self, stream: Any = None) -> Any:
-        assert stream is None  # of the processor
-        return self.values.__dlpack__()
-
-    def __dlpack_device__(self) -> tuple[int, int]:
-        return 1, 0
 
 
 def some(module: Any, n: int = N) -> np.ndarray:

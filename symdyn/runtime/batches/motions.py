@@ -16,6 +16,7 @@ from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.kinds import flag
 from symdyn.runtime.batches.arguments import side_by_side, take_rows, together
+from symdyn.runtime.batches.arrays_there import take_there
 from symdyn.runtime.batches.on_device import on_device
 from symdyn.runtime.batches.precision import checked_precision
 from symdyn.runtime.batches.sensitivities import Columns
@@ -67,6 +68,10 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     gpu = device_number(device, module.name)
     precision = checked_precision(precision, gpu is not None, module.name)
     checked_method(module, method)
+    there = None
+    if gpu is not None:
+        given, there = take_there(module, gpu, precision, {"q": q, "u": u, "z": z, "params": params, "inputs": inputs})
+        q, u, z, params, inputs = (given[group] for group in ("q", "u", "z", "params", "inputs"))
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
     controlled = flag(sensitivity_control, f"{module.name}: sensitivity_control")
@@ -85,7 +90,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     columns = columns if columns is not None and columns.n else None
     n_columns = 0 if columns is None else columns.n
     # The states that are kept, and starts, parameters, inputs and the report of each motion.
-    demand(n * (len(times) * metadata.sizes.x * (1 + 2 * n_columns) + metadata.sizes.x + 12), module.name,
+    kept = 0 if there is not None else len(times)
+    demand(n * (kept * metadata.sizes.x * (1 + 2 * n_columns) + metadata.sizes.x + 12), module.name,
            f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
@@ -96,17 +102,17 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         check_fits(module, options.get("method"), along)
     asked = Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"), along,
-                   wanted(module, events), checked_spacing(module, event_spacing, span), columns)
+                   wanted(module, events), checked_spacing(module, event_spacing, span), columns, there)
     note = why_one_by_one(module) or _why_these(along, options) or why_columns_one_by_one(
         module, asked.look, n_columns)
     if columns is not None:
         options |= {"sensitivities": columns.given, "sensitivity_control": controlled}
     over_time = {"interpolation": interpolation, "extend": extend} if by_time else {}
     varying = inputs if by_time else None
-    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.validity_checks else fixed
+    used = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.validity_checks else fixed
     rest = over_time | {"events": events, "event_spacing": asked.event_spacing}
     if note and gpu is None:
-        solution = _one_by_one(module, asked, varying, given, note, options | rest)
+        solution = _one_by_one(module, asked, varying, used, note, options | rest)
     else:
         def alone(which: np.ndarray) -> BatchSolution:
             kept = ("method", "sensitivities", "sensitivity_control")
@@ -115,9 +121,9 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         method_or_default = options.get("method", METHOD)
         solution = _on_vectors(module, asked, method_or_default, alone) if gpu is None else on_device(
             module, asked, gpu, options, alone, precision)
-        if along is not None and along.pieces is not None and given.ndim == 3:
-            given[:] = along.pieces.at(times)
-    return _warned(module, asked, solution, given)
+        if along is not None and along.pieces is not None and used.ndim == 3:
+            used[:] = along.pieces.at(times)
+    return _warned(module, asked, solution, used)
 
 
 def _warned(module: Module, asked: Asked, solution: BatchSolution, given: np.ndarray) -> BatchSolution:
@@ -128,7 +134,8 @@ def _warned(module: Module, asked: Asked, solution: BatchSolution, given: np.nda
         warnings.warn(f"{len(solution.messages)} of {asked.n} motions failed: {'; '.join(examples)}{more}", SimulationWarning,
                       stacklevel=4)
     near = locked(module, asked.times, solution.x, asked.rtol) if module.metadata.charts else []
-    for sentence in outside(module, asked.times, solution.x, asked.params, given) + near:
+    left = outside(module, asked.times, solution.x, asked.params, given) if module.metadata.validity_checks else []
+    for sentence in left + near:
         warnings.warn(sentence, SimulationWarning, stacklevel=4)
     return solution
 
@@ -199,6 +206,7 @@ def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.n
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
     real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, together.atol, asked.times)])
+    assert isinstance(together.x, np.ndarray)  # a device has rows of its own
     out = (ctypes.c_void_p * 2)(together.x.ctypes.data, together.states.ctypes.data)
     pieces, stops = together.pieces, together.stops
     problem = Problem(n_stops=len(stops), stops=stops.ctypes.data)

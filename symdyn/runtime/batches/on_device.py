@@ -10,16 +10,18 @@ import numpy as np
 from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import ArgumentError
-from symdyn.runtime.batches.precision import LEAST_RTOL
+from symdyn.runtime.batches.precision import LEAST_RTOL, PRECISIONS
 from symdyn.runtime.batches.solution import BatchSolution
 from symdyn.runtime.batches.starts import projects
 from symdyn.runtime.batches.states_on_device import device_kernel
 from symdyn.runtime.batches.together import Asked, Together
 from symdyn.runtime.gpu import device as devices
+from symdyn.runtime.gpu.arrays import RowsThere
+from symdyn.runtime.gpu.dlpack import DeviceArray
 from symdyn.runtime.gpu.motions import MOST_STEPS, MotionKernels, Work, integrate
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.methods import unfit
-from symdyn.runtime.integrating.run_record import SingleReport
+from symdyn.runtime.integrating.run_record import STATUS, SingleReport
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -44,34 +46,51 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
                                              single=precision == "single"))
         kernels = MotionKernels(*(device_kernel(module, device, library.source, f"{library.metadata.name}_{what}")
                                   for what in ("motions", "motion_size")))
-        motions = Together(module, asked)
+        there, shape = asked.there, (asked.n, len(asked.times), module.metadata.sizes.x)
+        motions = Together(module, asked, None if there is None else RowsThere(
+            device, shape, np.dtype(PRECISIONS[precision]), module.name))
         work = Work(motions.starts, asked.inputs, motions.params, motions.lengths, motions.span, asked.atol, asked.times,
                     projects(module), motions.pieces, motions.stops, motions.look, asked.event_spacing, motions.taken_after,
-                    *_results(motions, precision), motions.doubts)
+                    *_results(motions, precision), motions.doubts, _numbers(module, asked, motions, precision))
         interrupted, note = False, ""
         try:
             note = integrate(device, kernels, work, module.name)
         except KeyboardInterrupt:
             interrupted = True
+            if isinstance(motions.x, RowsThere):  # what was not begun
+                of = work.reports
+                motions.x[np.flatnonzero((of["status"] == STATUS.STEP_LIMIT) & (of["n_steps"] + of["n_rejected"] == 0))] = np.nan
         _take(motions, work)
         return motions.solution(library, device.at_once(kernels.motions), note, interrupted, MOST_STEPS, alone)
     finally:
         device.close()
 
 
-def _results(motions: Together, precision: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _numbers(module: Module, asked: Asked, motions: Together, precision: str) -> dict[int, tuple[int, int]]:
+    """What the kernel reads of arrays on the device: where it was not replaced when it was checked."""
+    if asked.there is None:
+        return {}
+    same = {"x": np.array_equal(motions.starts, asked.starts, equal_nan=True), "inputs": asked.along is None,
+            "params": np.array_equal(motions.params, asked.params, equal_nan=True)}
+    return asked.there.numbers(module.metadata, np.dtype(PRECISIONS[precision]).itemsize, same)
+
+
+def _results(motions: Together, precision: str) -> tuple[np.ndarray | DeviceArray, np.ndarray, np.ndarray]:
     """Where states at output times, states of reports, and reports go."""
     if precision == "double":
-        return motions.x, motions.states, motions.reports
+        return motions.x if isinstance(motions.x, np.ndarray) else motions.x.array, motions.states, motions.reports
     reports = np.zeros(len(motions.reports), dtype=np.dtype(SingleReport))
     reports["status"] = motions.reports["status"]
-    return np.full(motions.x.shape, np.nan, np.float32), np.full(motions.states.shape, np.nan, np.float32), reports
+    x = np.full(motions.x.shape, np.nan, np.float32) if isinstance(motions.x, np.ndarray) else motions.x.array
+    return x, np.full(motions.states.shape, np.nan, np.float32), reports
 
 
 def _take(motions: Together, work: Work) -> None:
     """Results in single precision as doubles."""
-    if work.x is not motions.x:
-        motions.x[:], motions.states[:] = work.x, work.states
+    if work.states is not motions.states:
+        if isinstance(motions.x, np.ndarray):
+            motions.x[:] = work.x
+        motions.states[:] = work.states
         for name in motions.reports.dtype.names or ():
             motions.reports[name] = work.reports[name]
 

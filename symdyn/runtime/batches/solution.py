@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.errors import ArgumentError
+from symdyn.runtime.gpu.dlpack import DeviceArray
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -58,8 +60,7 @@ class BatchSolution:
     """Motions of one mechanism from many starts, with many parameters.
 
     t          (n_t,) output times, s
-    x          (n, n_t, n_x) states [q; u; z]; NaN after a trajectory has failed, or an event has ended it, whose state is the end
-               state where only that is kept
+    states     states where they lie, in the memory of this process or on a device, see `x` and `x_on_device`
     success    (n,) whether the end was reached; messages: of those that did not, when, where and why, by their number
     n_steps, n_rejected   (n,) steps of the integrator
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is
@@ -74,7 +75,7 @@ class BatchSolution:
 
     metadata: ModuleMetadata
     t: np.ndarray
-    x: np.ndarray
+    states: np.ndarray | DeviceArray
     success: np.ndarray
     messages: Mapping[int, str]
     n_steps: np.ndarray
@@ -84,6 +85,38 @@ class BatchSolution:
     seconds: float = field(default=0.0, compare=False)
     columns: BatchSensitivity | None = None
     doubts: Mapping[int, Sequence[str]] = field(default_factory=dict)
+
+    @cached_property
+    def x(self) -> np.ndarray:
+        """States [q; u; z], (n, n_t, n_x); NaN after a trajectory has failed, or an event has ended it, whose state is the end
+        state where only that is kept. Those on a device are copied here, as doubles, at the first use.
+
+        >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
+        >>> motions.x.shape
+        (2, 1, 2)
+        """
+        if isinstance(self.states, np.ndarray):
+            return self.states
+        return np.asarray(self.states.to_numpy(), dtype=float)
+
+    @property
+    def x_on_device(self) -> DeviceArray:
+        """States (n, n_t, n_x) on the GPU, where they were computed from arrays there, of float64 or, in single precision, of
+        float32. JAX, CuPy and PyTorch take them by `from_dlpack`, without a copy.
+
+        Raises ArgumentError where they lie in the memory of this process.
+
+        >>> motions = sd.systems.pendulum().compile(backend="numpy").simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1))
+        >>> from dataclasses import replace
+        >>> from symdyn.runtime.gpu.dlpack import CPU, DeviceArray
+        >>> there = DeviceArray(motions.x.ctypes.data, motions.x.shape, motions.x.dtype, (CPU, 0), lambda: None, motions.x.copy)
+        >>> replace(motions, states=there).x_on_device
+        <DeviceArray 2 x 1 x 2 of float64>
+        """
+        if isinstance(self.states, np.ndarray):
+            raise ArgumentError(f"{self.metadata.name}: the states of these motions lie in the memory of this process; take x, "
+                                "or pass simulate_batch(..., device='gpu') starts, parameters or inputs that lie on the GPU")
+        return self.states
 
     @property
     def sensitivity(self) -> BatchSensitivity:
@@ -129,7 +162,7 @@ class BatchSolution:
         return self.x[..., _place(name_of(name), self.metadata.x, f"{self.metadata.name}: there is no state")]
 
     def __len__(self) -> int:
-        return len(self.x)
+        return len(self.success)
 
     def __repr__(self) -> str:
         remark = f"; {self.note}" if self.note else ""

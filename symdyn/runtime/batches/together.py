@@ -25,6 +25,8 @@ from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.memory import aligned
 
 if TYPE_CHECKING:
+    from symdyn.runtime.batches.arrays_there import ArraysThere
+    from symdyn.runtime.gpu.arrays import RowsThere
     from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.module import Module
 
@@ -39,6 +41,7 @@ class Asked:
     along          inputs over time, the same for all; None: there are none
     look           which events are looked for, (n_e,) of bool; event_spacing: of samples of them, s
     columns        of sensitivities; None: there are none
+    there          of starts, params and inputs what lies on a device, too; None: nothing
     """
 
     n: int
@@ -55,6 +58,7 @@ class Asked:
     look: np.ndarray
     event_spacing: float
     columns: Columns | None = None
+    there: ArraysThere | None = None
 
     @property
     def looks(self) -> bool:
@@ -71,10 +75,13 @@ class Together:
     alone                     which motions are integrated alone in any case, (n,) of bool
     """
 
-    def __init__(self, module: Module, asked: Asked) -> None:
+    x: np.ndarray | RowsThere
+
+    def __init__(self, module: Module, asked: Asked, x: RowsThere | None = None) -> None:
+        """x: on a device; None: a new array here."""
         n, n_x = asked.n, module.metadata.sizes.x * (1 if asked.columns is None else 1 + asked.columns.n)
         self.module, self.asked = module, asked
-        self.x = aligned((n, len(asked.times), n_x), np.nan)
+        self.x = aligned((n, len(asked.times), n_x), np.nan) if x is None else x
         self.reports = np.zeros(n, dtype=np.dtype(RunReport))
         self.reports["status"] = STATUS.STEP_LIMIT
         self.states = np.full((n, 2, n_x), np.nan)
@@ -109,7 +116,7 @@ class Together:
         """
         module, reports, n, columns = self.module, self.reports, self.asked.n, self.asked.columns
         x, matrix = self.x, None
-        if columns is not None:
+        if columns is not None and isinstance(self.x, np.ndarray):
             x, matrix = columns.apart(self.x)
         success, counts = np.isin(reports["status"], (STATUS.DONE, STATUS.STOPPED)), _counts(reports)
         late = reports["status"] == STATUS.STEP_LIMIT
@@ -163,7 +170,8 @@ class Together:
             messages |= {int(again[k]): message for k, message in single.messages.items()}
             doubts |= {int(again[k]): list(texts) for k, texts in single.doubts.items()}
         warn(doubts, n)
-        solution = BatchSolution(module.metadata, self.asked.times, x, success, dict(sorted(messages.items())), counts[:, 0],
+        states = x if isinstance(x, np.ndarray) else x.array
+        solution = BatchSolution(module.metadata, self.asked.times, states, success, dict(sorted(messages.items())), counts[:, 0],
                                  counts[:, 1], width, note, clock.perf_counter() - self.begun,
                                  None if columns is None or matrix is None else BatchSensitivity(
                                      module.metadata, columns.asked.names, matrix), doubts)
@@ -174,7 +182,7 @@ class Together:
 
     def _rows(self) -> np.ndarray:
         """What is known of every motion, (n, n_t, n_x): where only its end is kept, the start, too."""
-        if self.x.shape[1] > 1:
+        if isinstance(self.x, np.ndarray) and self.x.shape[1] > 1:
             return self.x
         starts = np.broadcast_to(self.starts, (self.asked.n, self.starts.shape[1]))
         return np.stack([starts, self.states[:, 0]], axis=1)

@@ -63,12 +63,17 @@ class View:
     kept: Any
 
 
+def place_of(values: Any) -> tuple[int, int] | None:
+    """Type and number of the device that an array of another library lies on; None for what is none."""
+    if isinstance(values, (np.ndarray, type)) or not (hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")):
+        return None
+    where = values.__dlpack_device__()
+    return int(where[0]), int(where[1])
+
+
 def is_on(values: Any, kind: int, number: int) -> bool:
     """Whether values are an array of another library on the device of this type and number."""
-    if isinstance(values, np.ndarray) or not (hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")):
-        return False
-    where = values.__dlpack_device__()
-    return (int(where[0]), int(where[1])) == (kind, number)
+    return place_of(values) == (kind, number)
 
 
 def view(values: Any, stream: int | None, dtype: np.dtype, owner: str, what: str) -> View:
@@ -86,17 +91,24 @@ def view(values: Any, stream: int | None, dtype: np.dtype, owner: str, what: str
         precision = "double" if dtype.itemsize == 8 else "single"
         raise ArgumentError(f"{owner}: {what} is an array of {kind}{tensor.bits} on the device, and precision={precision!r} "
                             f"takes {dtype.name} there; convert it, or pass another precision")
-    strides = tuple(tensor.strides[k] for k in range(tensor.ndim)) if tensor.strides else tuple(
-        int(np.prod(shape[k + 1:], dtype=int)) for k in range(len(shape)))
+    strides = tuple(tensor.strides[k] for k in range(tensor.ndim)) if tensor.strides else _steps(shape)
     return View(int(tensor.data or 0) + tensor.byte_offset, shape, strides, capsule)
+
+
+def _steps(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Strides, in numbers, of an array whose last axis is that of neighbours."""
+    return tuple(int(np.prod(shape[k + 1:], dtype=int)) for k in range(len(shape)))
+
+
+def reach(one: View) -> tuple[int, int]:
+    """The first and the last number of an array's memory, counted from the number at its address."""
+    steps = [(n - 1) * stride for n, stride in zip(one.shape, one.strides, strict=True)]
+    return sum(min(0, s) for s in steps), sum(max(0, s) for s in steps)
 
 
 def overlap(a: View, b: View, size: int) -> bool:
     """Whether the memory that two arrays reach over has a part in common; size: of a number."""
-    ranges = []
-    for one in (a, b):
-        steps = [(n - 1) * stride * size for n, stride in zip(one.shape, one.strides, strict=True)]
-        ranges.append((one.address + sum(min(0, s) for s in steps), one.address + size + sum(max(0, s) for s in steps)))
+    ranges = [(one.address + size * low, one.address + size * (high + 1)) for one in (a, b) for low, high in [reach(one)]]
     return ranges[0][0] < ranges[1][1] and ranges[1][0] < ranges[0][1] and 0 not in (*a.shape, *b.shape)
 
 
@@ -121,6 +133,7 @@ class DeviceArray:
     nobody has them any more.
 
     shape, dtype   as of NumPy's arrays, row by row or, as `by_entry`, entry by entry
+    address        of the first number
 
     >>> from symdyn.runtime.gpu.dlpack import CPU, DeviceArray
     >>> here = np.arange(6.0)
@@ -129,16 +142,16 @@ class DeviceArray:
     array([3., 4., 5.])
     """
 
-    def __init__(self, address: int, shape: tuple[int, int], dtype: np.dtype, where: tuple[int, int],
+    def __init__(self, address: int, shape: tuple[int, ...], dtype: np.dtype, where: tuple[int, int],
                  release: Callable[[], None], fetch: Callable[[], np.ndarray], by_entry: bool = False) -> None:
         self.shape, self.dtype, self.by_entry = shape, dtype, by_entry
-        self._address, self._where, self._release, self._fetch = address, where, release, fetch
+        self.address, self._where, self._release, self._fetch = address, where, release, fetch
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __repr__(self) -> str:
-        return f"<DeviceArray {self.shape[0]} x {self.shape[1]} of {self.dtype.name}>"
+        return f"<DeviceArray {' x '.join(map(str, self.shape))} of {self.dtype.name}>"
 
     def __dlpack_device__(self) -> tuple[int, int]:
         return self._where
@@ -148,10 +161,10 @@ class DeviceArray:
         if copy or (dl_device is not None and tuple(dl_device) != self._where):
             raise BufferError(f"{self!r} is given as it is, where it is; leave copy and dl_device out")
         managed, key = _Managed(), next(_numbers)
-        rows, entries = self.shape
-        steps = (1, rows) if self.by_entry else (entries, 1)
-        shape, strides = (ctypes.c_int64 * 2)(rows, entries), (ctypes.c_int64 * 2)(*steps)
-        managed.tensor = _Tensor(self._address, *self._where, 2, _FLOAT, 8 * self.dtype.itemsize, 1,
+        axes = len(self.shape)
+        steps = _steps(self.shape[::-1])[::-1] if self.by_entry else _steps(self.shape)
+        shape, strides = (ctypes.c_int64 * axes)(*self.shape), (ctypes.c_int64 * axes)(*steps)
+        managed.tensor = _Tensor(self.address, *self._where, axes, _FLOAT, 8 * self.dtype.itemsize, 1,
                                  ctypes.cast(shape, ctypes.POINTER(ctypes.c_int64)),
                                  ctypes.cast(strides, ctypes.POINTER(ctypes.c_int64)), 0)
         managed.context, managed.deleter = key, _deleter

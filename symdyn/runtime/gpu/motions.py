@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import functools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 from symdyn.backend.c_records import fields_of
 from symdyn.runtime.batches.states import Table
 from symdyn.runtime.gpu.device import Device, NoDevice
+from symdyn.runtime.gpu.dlpack import DeviceArray
 from symdyn.runtime.gpu.turns import in_turns, parts_of
 from symdyn.runtime.inputs.tables import Pieces
 from symdyn.runtime.memory import in_bytes
@@ -46,7 +49,8 @@ class Work:
     pieces, stops   inputs over time, and instants that steps end at
     look, event_spacing, taken_after   events to look for, (n_e,) of integers, empty: none; samples of them; steps between takes
     x, states, reports, doubts   results of n motions
-    Numbers of the device are of the type of x, but for times.
+    there      where numbers of motions lie on the device already, by their place among all that are given: address and stride
+    Numbers of the device are of the type of x, but for times. Where x is an array there, it stays there.
     """
 
     starts: np.ndarray
@@ -62,29 +66,39 @@ class Work:
     look: np.ndarray
     event_spacing: float
     taken_after: int
-    x: np.ndarray
+    x: np.ndarray | DeviceArray
     states: np.ndarray
     reports: np.ndarray
     doubts: np.ndarray
+    there: Mapping[int, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def dtype(self) -> np.dtype:
         """The type of numbers on the device."""
         return self.x.dtype
 
-    @property
-    def given(self) -> tuple[np.ndarray, ...]:
-        """In the order of the kernel."""
-        return self.starts, self.inputs, self.params, self.lengths
+    @functools.cached_property
+    def given(self) -> tuple[tuple[list[int], np.ndarray], ...]:
+        """What is brought to the device: places of numbers in the order of the kernel, and rows of them, or one for all."""
+        result: list[tuple[list[int], np.ndarray]] = []
+        first = 0
+        for rows in (self.starts, self.inputs, self.params, self.lengths):
+            here = [k for k in range(rows.shape[1]) if first + k not in self.there]
+            kept = rows if len(here) == rows.shape[1] else rows[:, here]
+            if kept is not rows and not (kept != kept[:1]).any():
+                kept = kept[:1]
+            result.append(([first + k for k in here], kept))
+            first += rows.shape[1]
+        return tuple(result)
 
     @property
     def results(self) -> tuple[np.ndarray, ...]:
-        """What the kernel writes."""
-        return self.x, self.states, self.reports, self.doubts
+        """What is copied back."""
+        return *((self.x,) if isinstance(self.x, np.ndarray) else ()), self.states, self.reports, self.doubts
 
     def bytes_each(self) -> int:
         """What one motion takes of the device's memory."""
-        varying = sum(a.shape[1] * self.dtype.itemsize for a in self.given if len(a) > 1)
+        varying = sum(a.shape[1] * self.dtype.itemsize for _, a in self.given if len(a) > 1)
         return varying + sum(a[:1].nbytes for a in self.results)
 
 
@@ -123,14 +137,14 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
     Raises NoDevice where not even a few motions fit into the memory. After a KeyboardInterrupt what is under way is waited
     for; chunks that were not begun keep their results as they were.
     """
-    n, kernel = len(work.x), kernels.motions
+    n, kernel = len(work.reports), kernels.motions
     threads = device.at_once(kernel)
     times = [np.ascontiguousarray(a, dtype=float) for a in (work.span, work.times)]
     pieces = (np.zeros(0), np.zeros(0)) if work.pieces is None else (work.pieces.breaks, work.pieces.coefficients)
     fixed = [*times, *(np.ascontiguousarray(a, dtype=work.dtype) for a in (work.atol, work.stops, *pieces))]
     fixed.append(np.ascontiguousarray(work.look, dtype=np.intc))
     # One row for all is copied once a slot.
-    around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
+    around = sum(a.nbytes + ALIGNED for a in (*fixed, *(a[:1] for _, a in work.given))) * SLOTS + SLOTS * 16 * ALIGNED
     free, stacks = device.free(), device.stacks(kernel)
     lanes = min(n, threads)
     put = lanes * _motion_size(device, kernels.motion_size) if lanes > WARP else 0
@@ -144,6 +158,7 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
                             f"{f', {in_bytes(stacks)} of these for stacks of threads' * bool(stacks)}; ask for fewer output times"
                             f"{', or free some' * bool(stacks)}")
     size = max(1, min(n, most, max(ROUNDS * threads, -(-n // (4 * SLOTS)))))
+    numbers = len(work.there) + sum(len(places) for places, _ in work.given)
     taken: list[int] = []
 
     def allocated(nbytes: int) -> int:
@@ -152,9 +167,9 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
 
     try:
         places = [allocated(a.nbytes) for a in fixed]
-        slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * work.dtype.itemsize) for a in work.given],
+        slots = [_Slot(device.stream(), [allocated(min(len(a), size) * a.shape[1] * work.dtype.itemsize) for _, a in work.given],
                        [allocated(size * a[:1].nbytes) for a in work.results],
-                       allocated(len(work.given) * ctypes.sizeof(Table)), allocated(TURNS * 2 * ctypes.sizeof(ctypes.c_int)),
+                       allocated(numbers * ctypes.sizeof(Table)), allocated(TURNS * 2 * ctypes.sizeof(ctypes.c_int)),
                        [allocated(put), allocated(put)] if put else [])
                  for _ in range(min(SLOTS, -(-n // size)))]
         for index, values in zip(places, fixed, strict=True):
@@ -171,24 +186,30 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
 
 def _begin(device: Device, kernel: Any, work: Work, slot: _Slot, places: list[int], rows: range, threads: int) -> None:
     part, n = slice(rows.start, rows.stop), len(rows)
-    tables = (Table * len(work.given))()
-    slot.kept = []
-    for k, (values, address) in enumerate(zip(work.given, slot.given, strict=True)):
-        mine = np.ascontiguousarray(values[part] if len(values) > 1 else values, dtype=work.dtype)
-        tables[k] = Table(address, mine.shape[1] if len(values) > 1 else 0, 1)
+    item, slot.kept = work.dtype.itemsize, []
+    tables = (Table * (len(work.there) + sum(len(numbers) for numbers, _ in work.given)))()
+    for (numbers, values), address in zip(work.given, slot.given, strict=True):
+        varies = len(values) > 1
+        mine = np.ascontiguousarray(values[part] if varies else values, dtype=work.dtype)
+        for k, number in enumerate(numbers):
+            tables[number] = Table(address + k * item, len(numbers) if varies else 0, 1)
         device.upload(slot.stream, address, mine)
         slot.kept.append(mine)
+    for number, (address, row) in work.there.items():
+        tables[number] = Table(address + rows.start * row * item, row, 1)
     headers = np.frombuffer(bytes(tables), dtype=np.uint8)
     for values, address in ((headers, slot.tables), (np.zeros((TURNS, 2), dtype=np.intc), slot.counters)):
         device.upload(slot.stream, address, values)
         slot.kept.append(values)
     span, times, atol, stops, breaks, coefficients, look = places
+    *own, states, reports, doubts = slot.results
+    x = own[0] if isinstance(work.x, np.ndarray) else work.x.address + rows.start * int(np.prod(work.x.shape[1:])) * item
     slot.turn, slot.argument = 0, Motions(
         n=n, n_out=len(work.times), max_steps=MOST_STEPS, given=slot.tables, span=span, atol=atol, t_out=times,
         n_pieces=0 if work.pieces is None else len(work.pieces.coefficients), breaks=breaks, pieces=coefficients,
         n_stops=len(work.stops), stops=stops, project=int(work.project), look=look if len(work.look) else None,
-        event_spacing=work.event_spacing, events_taken_after=work.taken_after, x_out=slot.results[0], states=slot.results[1],
-        reports=slot.results[2], doubts=slot.results[3])
+        event_spacing=work.event_spacing, events_taken_after=work.taken_after, x_out=x, states=states, reports=reports,
+        doubts=doubts)
     _launch(device, kernel, slot, 0, min(threads, n))
     slot.rows = rows
 

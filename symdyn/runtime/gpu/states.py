@@ -12,6 +12,7 @@ import numpy as np
 from symdyn.backend.c_records import fields_of
 from symdyn.errors import ArgumentError
 from symdyn.runtime.batches.states import Table
+from symdyn.runtime.gpu.arrays import array_of
 from symdyn.runtime.gpu.device import Device
 from symdyn.runtime.gpu.dlpack import DeviceArray, View
 from symdyn.runtime.gpu.motions import ALIGNED, SHARE, SLOTS
@@ -173,18 +174,7 @@ def rates_there(device: Device, kernels: Kernels, n: int, arrays: Mapping[str, n
         raise
     finally:
         memory.release()
-    return None if result is None else _array(device, result, (n, kernels.n_x), kernels.dtype), codes
-
-
-def _array(device: Device, address: int, shape: tuple[int, int], dtype: np.dtype) -> DeviceArray:
-    def fetch() -> np.ndarray:
-        result, stream = np.empty(shape[::-1], dtype=dtype), device.stream()
-        device.download(stream, result, address)
-        device.wait(stream)
-        device.close()
-        return result.T
-
-    return DeviceArray(address, shape, dtype, device.where, lambda: device.release(address), fetch, True)
+    return None if result is None else array_of(device, result, (n, kernels.n_x), kernels.dtype, True), codes
 
 
 def _bring(device: Device, slot: _Slot, group: str, values: np.ndarray, dtype: np.dtype) -> Table:

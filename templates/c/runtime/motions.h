@@ -40,11 +40,11 @@ static void symdyn_begin_motion(const symdyn_motions *motions, long i, symdyn_mo
     own->written = 0;
     own->left = motions->max_steps;
     own->doubts = 0;
-    const symdyn_table x = motions->given[0], inputs = motions->given[1], p = motions->given[2], length = motions->given[3];
+    const symdyn_table *const x = motions->given, *const inputs = x + SYMDYN_NX, *const p = inputs + SYMDYN_NIN;
     double *const c = numbers + SYMDYN_NP, *const u = c + SYMDYN_NC, x0[SYMDYN_NX];
-    for (int k = 0; k < SYMDYN_NX; k++) x0[k] = x.at[i * x.row + k * x.entry];
-    for (int k = 0; k < SYMDYN_NIN; k++) u[k] = inputs.at[i * inputs.row + k * inputs.entry];
-    for (int k = 0; k < SYMDYN_NP; k++) numbers[k] = p.at[i * p.row + k * p.entry];
+    for (int k = 0; k < SYMDYN_NX; k++) x0[k] = x[k].at[i * x[k].row];
+    for (int k = 0; k < SYMDYN_NIN; k++) u[k] = inputs[k].at[i * inputs[k].row];
+    for (int k = 0; k < SYMDYN_NP; k++) numbers[k] = p[k].at[i * p[k].row];
     const int code = SYMDYN_NAME(prologue)(numbers, c);
     const symdyn_problem problem = {
         .p = numbers,
@@ -56,7 +56,7 @@ static void symdyn_begin_motion(const symdyn_motions *motions, long i, symdyn_mo
         .n_stops = motions->n_stops,
         .stops = motions->stops,
         .project = motions->project,
-        .length = length.at[i * length.row],
+        .length = p[SYMDYN_NP].at[i * p[SYMDYN_NP].row],
     };
     SYMDYN_NAME(simulation_start)(run, &problem, motions->span, x0, motions->atol);
 #if SYMDYN_EVENTS

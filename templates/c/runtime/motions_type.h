@@ -7,7 +7,7 @@
 
 typedef struct {
     long n, n_out, max_steps;         // trajectories; output times; attempted steps of one trajectory, at most
-    const symdyn_table *given;        // states, inputs, parameters, lengths that residuals are measured by, m
+    const symdyn_table *given;        // of every state, input and parameter, and of the length that residuals are measured by, m
     const symdyn_time *span, *t_out;  // t0, t_end, rtol, first step, largest step; output times
     const double *atol;               // of every state
     long n_pieces;                    // of inputs over time, see problem_type.h
