@@ -840,9 +840,10 @@ class Module:
         sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions; see `BatchSolution.sensitivity`
 
         device      "cpu"; or "gpu", "gpu:1" for the second one: a thread each on an NVIDIA GPU, by the kernel that the C of the
-                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits. Arrays of JAX, CuPy and
-                    PyTorch (any that has `__dlpack__`) that lie there, of starts, parameters or inputs, are read there, and
-                    states stay there: `BatchSolution.x_on_device`, which `x` copies at its first use
+                    mechanism is, too (`pip install 'symdyn[gpu]'`). Results are not the same bits. Starts, parameters and
+                    inputs in arrays of JAX, CuPy and PyTorch that lie there (any that has `__dlpack__` or
+                    `__cuda_array_interface__`) are read there, and states stay there: `BatchSolution.x_on_device`, which `x`
+                    copies at its first use
 
         precision   of the device, and of arrays there: "double", or "single": float32, with rtol from 1e-6 on, compensated sums
                     over steps, times in doubles; without constraints and events, by explicit methods

@@ -46,6 +46,9 @@ int cuMemAlloc_v2(unsigned long long *address, size_t size) {
     return size && *address ? OK : OUT_OF_MEMORY;
 }
 int cuMemFree_v2(unsigned long long address) { return n_blocks--, free((void *)address), OK; }
+int cuPointerGetAttribute(void *value, int which, unsigned long long address) {
+    return *(int *)value = 0, address && which == 9 ? OK : INVALID;
+}
 int cuStreamCreate(void **stream, unsigned flags) { return n_streams++, *stream = malloc(1), flags == 1 ? OK : INVALID; }
 int cuStreamDestroy_v2(void *stream) { return n_streams--, free(stream), OK; }
 int cuStreamSynchronize(void *stream) { return stream ? OK : INVALID; }

@@ -33,6 +33,15 @@ class There:
         return self.where
 
 
+class Interface:
+    """An array that is on the device, by the CUDA array interface alone."""
+
+    def __init__(self, values: np.ndarray, **other: Any) -> None:
+        self.values = values
+        self.__cuda_array_interface__ = {"shape": values.shape, "typestr": values.dtype.str, "strides": values.strides,
+                                         "data": (values.ctypes.data, False), "stream": None, "version": 3, **other}
+
+
 class HostDevice:
     """Memory are buffers of this process. What a stream is given is done when it is waited for, as late as a GPU may do it.
 
@@ -80,6 +89,10 @@ class HostDevice:
     def handle(self, stream: list[Any]) -> None:
         return None
 
+    def number_of(self, address: int) -> int:
+        """Of what was lent 0, of all else 1."""
+        return int(not any(low <= address < high for low, high in map(np.lib.array_utils.byte_bounds, self.lent)))
+
     def upload(self, stream: list[Any], address: int, values: np.ndarray) -> None:
         self._inside(address, values.nbytes)
         stream.append(lambda: self._copy("up", address, values.ctypes.data, values.nbytes))
@@ -96,7 +109,10 @@ class HostDevice:
         self.log.append(("begin", argument.n))
         stream.append(lambda: self._run(kernel, copied))
 
-    def wait(self, stream: list[Any]) -> None:
+    def wait(self, stream: Any) -> None:
+        if isinstance(stream, int):  # of another library
+            self.log.append(("wait", stream))
+            return
         while stream:
             stream.pop(0)()
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host_device import HostDevice, Lockstep, There, compiled
+from host_device import HostDevice, Interface, Lockstep, There, compiled
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
@@ -156,6 +156,36 @@ def test_jax(host: HostDevice) -> None:
         there = module.simulate_batch(q, x[:, 2:], t=T, device="gpu")
         taken = jax.dlpack.from_dlpack(there.x_on_device)
         assert taken.dtype == "float64" and np.array_equal(np.asarray(taken), module.simulate_batch(x[:, :2], x[:, 2:], t=T).x)
+
+
+def test_arrays_of_the_cuda_array_interface(host: HostDevice) -> None:
+    module, x = compiled("double_pendulum"), states()
+    here = module.simulate_batch(x[:, :2], x[:, 2:], t=T)
+    host.lent.append(x)
+    same(module.simulate_batch(Interface(x[:, :2]), Interface(x[:, 2:], stream=7), t=T, device="gpu"), here)
+    assert [n for what, n in host.log if what == "wait"] == [7]
+    rows = np.ascontiguousarray(x[:, :2])
+    host.lent.append(rows)
+    # In version 2 what it waits for is not known; without strides rows are neighbours.
+    old = Interface(rows, strides=None, version=2)
+    del old.__cuda_array_interface__["stream"]
+    same(module.simulate_batch(old, {"q1_dot": There(x[:, 2]), "q2_dot": Interface(x[:, 3])}, t=T, device="gpu"), here)
+    assert [n for what, n in host.log if what == "wait"] == [7, 1]
+    same(module.simulate_batch(x[:, :2], x[:, 2:], z=Interface(np.zeros((N, 0)), data=(0, False)), t=T, device="gpu"), here)
+    out = np.zeros_like(x)
+    host.lent.append(out)
+    written = Interface(out)
+    assert module.rhs_batch(0.0, Interface(x), out=written, device="gpu") is written
+    assert np.array_equal(out, module.rhs_batch(0.0, x))
+    away = np.zeros((N, 2))
+    for wrong, match in ((Interface(away), "q lies on the GPU with the number 1, and motions are computed on that"),
+                         (Interface(x[:, :2], typestr="<i8"), "q is an array of int64 on the device, and precision='double'"),
+                         (Interface(x[:, :2], mask=There(x)), "q is a masked array, whose hidden entries would count"),
+                         (Interface(x[:, :2], strides=(12, 4)), r"q has strides of \(12, 4\) bytes, which are no multiples")):
+        with pytest.raises(ArgumentError, match=match):
+            module.simulate_batch(wrong, t=T, device="gpu")
+    with pytest.raises(ArgumentError, match="out lies on the device and must not be written; pass another array, or leave out"):
+        module.rhs_batch(0.0, Interface(x), out=Interface(out, data=(out.ctypes.data, True)), device="gpu")
 
 
 def test_arrays_that_do_not_fit(host: HostDevice) -> None:

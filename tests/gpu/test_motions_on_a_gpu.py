@@ -584,9 +584,12 @@ class There:
         return x[:, 1:3].__dlpack__()
     def __dlpack_device__(self):
         return 2, 0
-kept = module.simulate_batch(There(), t=(0, 0.1), device="gpu")
+class Interface:
+    __cuda_array_interface__ = {"shape": (9000,), "typestr": "<f8", "strides": (32,), "version": 3, "stream": 1,
+                                "data": (x.ctypes.data + 24, True)}
+kept = module.simulate_batch(There(), {"q2_dot": Interface()}, t=(0, 0.1), device="gpu")
 assert kept.x_on_device.__dlpack_device__() == (2, 0)
-assert np.array_equal(kept.x, module.simulate_batch(x[:, 1:3], t=(0, 0.1)).x)
+assert np.array_equal(kept.x, module.simulate_batch(x[:, 1:3], {"q2_dot": x[:, 3]}, t=(0, 0.1)).x)
 del kept
 counts = (ctypes.c_longlong * 4)()
 ctypes.CDLL("libcuda.so.1").fake_counts(counts)

@@ -12,7 +12,7 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.batches.precision import PRECISIONS
 from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.gpu.arrays import copied
-from symdyn.runtime.gpu.dlpack import View, place_of, view
+from symdyn.runtime.gpu.dlpack import View, has_place, place_of, view
 from symdyn.shown import name_of
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def take_there(module: Module, number: int, precision: str,
     Raises ArgumentError for arrays on another GPU, and for numbers that are not of the precision's type; NoDevice, MissingExtra.
     """
     groups = {group: dict(given) if isinstance(given, Mapping) else {"": given} for group, given in values.items()}
-    if not any(place_of(value) for given in groups.values() for value in given.values()):
+    if not any(has_place(value) for given in groups.values() for value in given.values()):
         return dict(values), None
     device, dtype = devices.open_device(number, module.name), np.dtype(PRECISIONS[precision])
     try:
@@ -62,13 +62,13 @@ def take_there(module: Module, number: int, precision: str,
         views: dict[tuple[str, str], View] = {}
         for group, given in groups.items():
             for key, value in given.items():
-                place, name = place_of(value), name_of(key)
+                place, name = place_of(value, device), name_of(key)
                 what = f"{group}, {name}" if name else group
                 if place is not None and place[0] == device.where[0] and place != device.where:
                     raise ArgumentError(f"{module.name}: {what} lies on the GPU with the number {place[1]}, and motions are "
                                         f"computed on that with the number {number}; pass device='gpu:{place[1]}', or copy it")
                 if place == device.where:
-                    views[group, name] = view(value, device.handle(stream), dtype, module.name, what)
+                    views[group, name] = view(value, device, stream, dtype, module.name, what)
                     given[key] = copied(device, stream, views[group, name], dtype)
         device.wait(stream)
         taken = {group: given if isinstance(values[group], Mapping) else given[""] for group, given in groups.items()}

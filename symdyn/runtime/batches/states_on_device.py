@@ -38,8 +38,8 @@ def states_on_device(module: Module, number: int, values: Mapping[str, Any], out
                             f"{module.backend}; kernels are made of its C, compile(backend='c')")
     device = devices.open_device(number, module.name)
     try:
-        there = {g: values[g] for g in GROUPS if is_on(values[g], *device.where)}
-        given_out = is_on(out, *device.where)
+        there = {g: values[g] for g in GROUPS if is_on(values[g], device)}
+        given_out = is_on(out, device)
         kernels, library = _kernels(module, device, precision)
         if "x" not in there:
             if there or given_out:
@@ -56,9 +56,9 @@ def states_on_device(module: Module, number: int, values: Mapping[str, Any], out
 def _there(module: Module, device: Device, kernels: Kernels, library: Any, values: Mapping[str, Any], there: Mapping[str, Any],
            out: Any, take: Taken) -> tuple[Any, dict[int, str], int, np.ndarray]:
     name, sizes = module.name, module.metadata.sizes
-    handle = device.handle(device.stream())
+    stream = device.stream()
     widths = {"t": 1, "x": sizes.x, "inputs": sizes.inputs, "params": sizes.p}
-    views = {g: view(a, handle, kernels.dtype, name, g) for g, a in there.items()}
+    views = {g: view(a, device, stream, kernels.dtype, name, g) for g, a in there.items()}
     if "t" in views and len(views["t"].shape) == 1:
         t = views["t"]
         views["t"] = View(t.address, (*t.shape, 1), (*t.strides, 1), t.kept)
@@ -74,12 +74,14 @@ def _there(module: Module, device: Device, kernels: Kernels, library: Any, value
                             "the same number of rows, one for each state")
     to = None
     if out is not None:
-        if not is_on(out, *device.where):
+        if not is_on(out, device):
             raise ArgumentError(f"{name}: x lies on the device and out does not; give an array there, or leave out away")
         if type(out).__module__.partition(".")[0] in CONSTANT:
             raise ArgumentError(f"{name}: out is an array of JAX, which counts on its arrays never to change; leave out away, "
                                 "and take the result by jax.dlpack.from_dlpack")
-        to = view(out, handle, kernels.dtype, name, "out")
+        to = view(out, device, stream, kernels.dtype, name, "out")
+        if to.constant:
+            raise ArgumentError(f"{name}: out lies on the device and must not be written; pass another array, or leave out away")
         if to.shape != (n, sizes.x):
             raise ArgumentError(f"{name}: out has the shape {to.shape} on the device, needed is ({n}, {sizes.x})")
         # A thread reads all of its state before it writes: out may be x itself.

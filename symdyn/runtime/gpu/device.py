@@ -59,6 +59,9 @@ class Device(Protocol):
     def handle(self, stream: Any) -> int | None:
         """A stream as DLPack has it."""
 
+    def number_of(self, address: int) -> int:
+        """The number of the device, of this type, that an address is of."""
+
     def upload(self, stream: Any, address: int, values: np.ndarray) -> None:
         """Copy an array to the device."""
 
@@ -137,6 +140,10 @@ class Cuda:
 
     def handle(self, stream: Any) -> int | None:
         return int(stream)
+
+    def number_of(self, address: int) -> int:
+        which = self.driver.CUpointer_attribute.CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL
+        return int(self._call("cuPointerGetAttribute", which, address))
 
     def upload(self, stream: Any, address: int, values: np.ndarray) -> None:
         if values.nbytes:

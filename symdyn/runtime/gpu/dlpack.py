@@ -9,17 +9,22 @@ import ctypes
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from symdyn.runtime.gpu.device import Device
+
 # The types of devices: the processor, CUDA.
 CPU, CUDA = 1, 2
 _FLOAT = 2
 _NAME = b"dltensor"
+# What arrays of CUDA have without DLPack, and how that calls the default stream.
+_INTERFACE, LEGACY = "__cuda_array_interface__", 1
 
 
 class _Tensor(ctypes.Structure):
@@ -55,44 +60,92 @@ class OnDevice(Protocol):
 
 @dataclass(frozen=True)
 class View:
-    """Numbers of an array on a device: address of the first one, shape and strides in numbers; `kept` keeps them there."""
+    """Numbers of an array on a device: address of the first one, shape and strides in numbers; `kept` keeps them there.
+
+    constant   whether they must not be written
+    """
 
     address: int
     shape: tuple[int, ...]
     strides: tuple[int, ...]
     kept: Any
+    constant: bool = False
 
 
-def place_of(values: Any) -> tuple[int, int] | None:
-    """Type and number of the device that an array of another library lies on; None for what is none."""
-    if isinstance(values, (np.ndarray, type)) or not (hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")):
+def has_place(values: Any) -> bool:
+    """Whether values are an array of another library, on whatever device."""
+    if isinstance(values, (np.ndarray, np.generic, type)):
+        return False
+    return _by_dlpack(values) or hasattr(values, _INTERFACE)
+
+
+def place_of(values: Any, device: Device) -> tuple[int, int] | None:
+    """Type and number of the device that an array of another library lies on; None for what is none.
+
+    device   that addresses are asked of, where an array has nothing but those
+    """
+    if not has_place(values):
         return None
-    where = values.__dlpack_device__()
-    return int(where[0]), int(where[1])
+    if _by_dlpack(values):
+        where = values.__dlpack_device__()
+        return int(where[0]), int(where[1])
+    address = int(getattr(values, _INTERFACE)["data"][0])
+    return device.where[0], device.number_of(address) if address else device.where[1]  # an empty array has no address
 
 
-def is_on(values: Any, kind: int, number: int) -> bool:
-    """Whether values are an array of another library on the device of this type and number."""
-    return place_of(values) == (kind, number)
+def is_on(values: Any, device: Device) -> bool:
+    """Whether values are an array of another library on this device."""
+    return place_of(values, device) == device.where
 
 
-def view(values: Any, stream: int | None, dtype: np.dtype, owner: str, what: str) -> View:
+def _by_dlpack(values: Any) -> bool:
+    return hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")
+
+
+def view(values: Any, device: Device, stream: Any, dtype: np.dtype, owner: str, what: str) -> View:
     """An array of another library, which waits for what its own stream still does.
 
-    stream   of the device, that it is read in; None on the processor
+    stream   of the device, that it is read in
     what     it is, in messages
     Raises ArgumentError where its numbers are not of the type.
     """
+    if not _by_dlpack(values):
+        return _view_of_interface(values, device, dtype, owner, what)
+    stream = device.handle(stream)
     capsule = values.__dlpack__() if stream is None else values.__dlpack__(stream=stream)
     tensor = _Managed.from_address(_pointer(capsule, _NAME)).tensor
     shape = tuple(tensor.shape[k] for k in range(tensor.ndim))
     if (tensor.code, tensor.bits, tensor.lanes) != (_FLOAT, 8 * dtype.itemsize, 1):
         kind = {0: "int", 1: "unsigned", _FLOAT: "float", 6: "bool"}.get(tensor.code, "other")
-        precision = "double" if dtype.itemsize == 8 else "single"
-        raise ArgumentError(f"{owner}: {what} is an array of {kind}{tensor.bits} on the device, and precision={precision!r} "
-                            f"takes {dtype.name} there; convert it, or pass another precision")
+        raise _other_type(f"{kind}{tensor.bits}", dtype, owner, what)
     strides = tuple(tensor.strides[k] for k in range(tensor.ndim)) if tensor.strides else _steps(shape)
     return View(int(tensor.data or 0) + tensor.byte_offset, shape, strides, capsule)
+
+
+def _view_of_interface(values: Any, device: Device, dtype: np.dtype, owner: str, what: str) -> View:
+    """An array by the CUDA array interface, https://numba.readthedocs.io/en/stable/cuda/cuda_array_interface.html (version 3)."""
+    about = getattr(values, _INTERFACE)
+    found, shape = np.dtype(about["typestr"]), tuple(about["shape"])
+    if found != dtype:
+        raise _other_type(found.name, dtype, owner, what)
+    if about.get("mask") is not None:
+        raise ArgumentError(f"{owner}: {what} is a masked array, whose hidden entries would count; pass one without a mask")
+    steps = about.get("strides")
+    if steps is not None and any(step % dtype.itemsize for step in steps):
+        raise ArgumentError(f"{owner}: {what} has strides of {shown(tuple(steps))} bytes, which are no multiples of "
+                            f"{dtype.itemsize}; pass a copy")
+    # Before version 3 what an array still waited for was not known: it is that of the default stream.
+    stream = about.get("stream", LEGACY if about.get("version", 0) < 3 else None)
+    if stream is not None:
+        device.wait(stream)
+    strides = _steps(shape) if steps is None else tuple(step // dtype.itemsize for step in steps)
+    return View(int(about["data"][0]), shape, strides, values, bool(about["data"][1]))
+
+
+def _other_type(found: str, dtype: np.dtype, owner: str, what: str) -> ArgumentError:
+    precision = "double" if dtype.itemsize == 8 else "single"
+    return ArgumentError(f"{owner}: {what} is an array of {found} on the device, and precision={precision!r} takes {dtype.name} "
+                         "there; convert it, or pass another precision")
 
 
 def _steps(shape: tuple[int, ...]) -> tuple[int, ...]:
