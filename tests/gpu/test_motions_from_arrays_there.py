@@ -139,6 +139,13 @@ def test_motions_in_warps_are_written_to_their_places(monkeypatch: pytest.Monkey
     same(there, module.simulate_batch(x[:, :2], x[:, 2:], t=T))
 
 
+def test_no_motions(host: HostDevice) -> None:
+    module, none = compiled("double_pendulum"), np.zeros((0, 2))
+    for q in (none, lent(host, none), {"q1": lent(host, none[:, 0])}):
+        motions_of_none = module.simulate_batch(q, t=T, device="gpu")
+        assert motions_of_none.x.shape == (0, 3, 4) and motions_of_none.note == "on a processor, without a motion"
+
+
 def test_single_precision(host: HostDevice) -> None:
     module, x = compiled("double_pendulum"), states().astype(np.float32)
     asked: dict[str, Any] = {"t": T, "rtol": 1e-6, "method": "bs54", "device": "gpu", "precision": "single"}

@@ -138,6 +138,8 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
     for; chunks that were not begun keep their results as they were.
     """
     n, kernel = len(work.reports), kernels.motions
+    if not n:
+        return f"on {device.name}, without a motion"
     threads = device.at_once(kernel)
     times = [np.ascontiguousarray(a, dtype=float) for a in (work.span, work.times)]
     pieces = (np.zeros(0), np.zeros(0)) if work.pieces is None else (work.pieces.breaks, work.pieces.coefficients)
