@@ -294,7 +294,7 @@ def test_measured_figures_are_rows_of_tables(site: Path) -> None:
             continue
         assert f"{stored['command']}, {stored['date']}: {stored['machine']}." in text
         for line in stored.get("lines", ()):
-            cells = [escape(cell, quote=False) for cell in re.split(r"\s{2,}", line)]
+            cells = [escape(cell, quote=False) for cell in re.split(r"\s{2,}", line.strip())]
             row = "".join(rf"\s*<t[dh][^>]*><p>{re.escape(cell)}</p></t[dh]>" for cell in cells)
             assert line in text or f"<td><p>{cells[0]}</p></td>" in page or re.search(row, page), line
         for cell in {cell for row in stored.get("rows", ()) for cell in row if cell}:
