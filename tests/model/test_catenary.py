@@ -12,12 +12,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
 from symdyn.exact.prove import zero
 from symdyn.model.elements.catenary import Catenary, potential
-from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
@@ -25,6 +22,7 @@ from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable
+from tests.model.generated_evaluator import evaluator_of
 
 NAMES = ("x", "z", "e", "c")
 # x, z, e, C_B. Part of the line lies, with friction or without; none lies; slack; far too short; nearly flat.
@@ -243,20 +241,7 @@ def unit(backend: str) -> Any:
         first = [d for leaf in leaves for d in forward(recorder, results, {leaf: 1})]
         outputs += [*results, *first, *(d for leaf in leaves for d in forward(recorder, first, {leaf: 1}))]
     tape = Tape.of(recorder, solve=np.array(outputs, dtype=object))
-    groups: dict[str, list[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
-    content = Content("line", "test", {"solve": tape}, {"solve": "solve"}, {**groups, "inputs": names}, {}, {}, {})
-    source = render(content, backend, standalone=False, integrator=False)
-    text = next(iter(source.files.values()))
-    if backend == "numpy":
-        made: Any = PythonLibrary.from_source(text, "line")
-    else:
-        compiler = find_compiler()
-        if compiler is None:
-            pytest.skip("no C compiler here")
-        made = CLibrary(text, source.metadata, compiler)
-    evaluator = made.evaluator("solve")
-    evaluator.set_params(np.zeros(0))
-    return evaluator
+    return evaluator_of(tape, names, backend)
 
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])

@@ -10,16 +10,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError, UnsupportedExpression
 from symdyn.model.elements.cube import Cube
-from symdyn.runtime.building.compiler import find_compiler
-from symdyn.runtime.building.library import CLibrary, PythonLibrary
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.differentiate import forward, reverse
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT
+from tests.model.generated_evaluator import evaluator_of
 
 NAMES = ["e0", "e1", "e2", "e3"]
 ORDERS = (0, 1, 2)
@@ -181,22 +179,7 @@ def test_derivatives_where_the_cut_is_a_face() -> None:
 
 @pytest.fixture(scope="module", params=["numpy", "c"])
 def evaluator(request: pytest.FixtureRequest) -> Any:
-    groups: dict[str, list[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
-    groups["inputs"] = NAMES
-    content = Content("cubes", "test", {"cube": taped()}, {"cube": "cube"}, groups, {}, {}, {})
-    source = render(content, request.param, standalone=False, integrator=False)
-    text = next(iter(source.files.values()))
-    unit: Any
-    if request.param == "numpy":
-        unit = PythonLibrary.from_source(text, "cubes")
-    else:
-        compiler = find_compiler()
-        if compiler is None:
-            pytest.skip("no C compiler here")
-        unit = CLibrary(text, source.metadata, compiler)
-    made = unit.evaluator("cube")
-    made.set_params(np.zeros(0))
-    return made
+    return evaluator_of(taped(), NAMES, request.param)
 
 
 def test_generated_code(evaluator: Any) -> None:
