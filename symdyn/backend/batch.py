@@ -52,7 +52,7 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program,
                   columns={name: those for name, those in columns.items() if name in names}, vectors=dialect).functions
     functions = {f.name: _whole(f.regular or f) for f in built if f.name in names}
-    text = "\n".join(line for function in functions.values() for way in function.with_called for part in (way.parts or (way,))
+    text = "\n".join(line for function in functions.values() for way in function.with_called for part in way.stretches
                      for lines in (part.loads, part.results, *[s.lines for s in part.sections]) for line in lines)
     used = set(re.findall(rf"\b{_PREFIX}\w+", text))
     return Batch(functions, tuple(f for f in available.values() if f.name in used))

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.lab.bridges import measured
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
@@ -340,11 +341,7 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
         if sum(n >= LEAST_OF_GROWTH for n in sizes) > 1:
             print(f"        {method}: seconds of a step grow with links^{exponent(rows, method, lambda row: row.of_a_step):.2f}, "
                   f"memory with links^{exponent(rows, method, lambda row: row.memory):.2f}")
-    print(REST_HEADING)
-    rests = []
-    for n in sizes:
-        rests.append(compare(n))
-        print(rests[-1], flush=True)
+    rests = measured(sizes, compare, REST_HEADING, None)
     if to_json is not None:
         result = {"motions": [asdict(row) for row in rows], "at rest": [asdict(rest) for rest in rests]}
         to_json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

@@ -64,7 +64,7 @@ def unaffected(module: Module, request: Request, names: Sequence[str], t: np.nda
 def groups_of(module: Module) -> tuple[int, int, int]:
     """Numbers of coordinates, speeds and extra states."""
     sizes = module.metadata.sizes
-    return sizes.q, sizes.u, sizes.x - sizes.q - sizes.u
+    return sizes.q, sizes.u, sizes.z
 
 
 def sizes(values: np.ndarray, groups: Sequence[int]) -> np.ndarray:
