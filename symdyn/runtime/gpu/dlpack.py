@@ -72,7 +72,7 @@ class View:
     constant: bool = False
 
 
-def has_place(values: Any) -> bool:
+def has_place(values: object) -> bool:
     """Whether values are an array of another library, on whatever device."""
     if isinstance(values, (np.ndarray, np.generic, type)):
         return False
@@ -98,7 +98,7 @@ def is_on(values: Any, device: Device) -> bool:
     return place_of(values, device) == device.where
 
 
-def _by_dlpack(values: Any) -> bool:
+def _by_dlpack(values: object) -> bool:
     return hasattr(values, "__dlpack__") and hasattr(values, "__dlpack_device__")
 
 

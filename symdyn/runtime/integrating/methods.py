@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeGuard
 
 from symdyn.backend.right_side import METHOD
 from symdyn.errors import ArgumentError
@@ -116,7 +116,7 @@ def unfit(module: Module, method: str, inputs: Inputs | None) -> str:
     return f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, inputs)
 
 
-def factors_of(module: Module, method: Any, way: str) -> str:
+def factors_of(module: Module, method: object, way: str) -> str:
     """How an implicit method factorizes its matrices, in words; "" for other methods.
 
     way   of stabilization: Baumgarte's changes the derivative
@@ -133,7 +133,7 @@ def factors_of(module: Module, method: Any, way: str) -> str:
     return f"dense: {module.metadata.sizes.x} states"
 
 
-def is_compiled(method: object) -> bool:
+def is_compiled(method: object) -> TypeGuard[str]:
     return isinstance(method, str) and method in COMPILED
 
 

@@ -334,7 +334,7 @@ def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.
     return max(relative, SMALLEST_RTOL), vector
 
 
-def _given(rtol: Any, atol: Any) -> str:
+def _given(rtol: object, atol: object) -> str:
     """Tolerances in words; atol None: it is rtol."""
     return f"rtol = {shown(rtol)}" + ("" if atol is None else f", atol = {shown(atol)}")
 
