@@ -25,17 +25,8 @@ class StatesOnly(Solution):
     What else a run of its own would know raises ArgumentError: see NOT_KEPT; states at other times do so already.
     """
 
-    def __init__(
-        self,
-        module: Module,
-        t: np.ndarray,
-        x: np.ndarray,
-        steps: tuple[int, int],
-        params: np.ndarray,
-        inputs: np.ndarray,
-        method: str,
-        tolerances: tuple[float, float],
-    ) -> None:
+    def __init__(self, module: Module, t: np.ndarray, x: np.ndarray, steps: tuple[int, int], params: np.ndarray,
+                 inputs: np.ndarray, method: str, tolerances: tuple[float, float]) -> None:
         """steps: those of the integrator, accepted and rejected."""
         outcome = Outcome(t, x, True, "reached the end", False, *steps, 0)
         super().__init__(module, outcome, params, Inputs(inputs), method, math.nan, tolerances=tolerances)
@@ -44,9 +35,7 @@ class StatesOnly(Solution):
 
     def __getattr__(self, name: str) -> Any:
         if name in NOT_KEPT:
-            raise ArgumentError(
-                f"{self.module.name}: {name} is not known of a motion that was integrated together with others; "
-                "there are t, x, params, inputs, n_steps, n_rejected, and what is computed from these, such as "
-                "outputs and energy; leave device out, so that functions get motions of their own"
-            )
+            raise ArgumentError(f"{self.module.name}: {name} is not known of a motion that was integrated together with others; "
+                                "there are t, x, params, inputs, n_steps, n_rejected, and what is computed from these, such as "
+                                "outputs and energy; leave device out, so that functions get motions of their own")
         raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
