@@ -13,9 +13,9 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.lab.bridges import measured, with_children
+from symdyn.lab.particles import add_particle
 from symdyn.model.closures import Rod
-from symdyn.model.joints import Prismatic
-from symdyn.model.symbols import coordinates, parameters
+from symdyn.model.symbols import parameters
 from symdyn.model.system import System
 
 if TYPE_CHECKING:
@@ -68,14 +68,9 @@ def net(rows: int, columns: int) -> System:
         if i == 0 and j in (0, columns - 1):
             knots[i, j] = system.ground, at
             continue
-        parent = system.ground
-        for letter, axis, value in zip("xyz", np.eye(3, dtype=int).tolist(), at, strict=True):
-            q, = coordinates(f"{letter}{i}_{j},")
-            child = system.add_body(f"{letter}_of_{i}_{j}", mass=mass if letter == "z" else 0)
-            system.add_joint(Prismatic(f"slide_{letter}{i}_{j}", parent, child, q, axis=axis))
-            system.initial[q] = value
-            parent = child
-        knots[i, j] = parent, [0, 0, 0]
+        body, position = add_particle(system, f"{i}_{j}", mass)
+        system.initial.update(zip(position, at, strict=True))
+        knots[i, j] = body, [0, 0, 0]
     for i, j in knots:
         for other in ((i, j + 1), (i + 1, j)):
             if other in knots and not (knots[i, j][0] is knots[other][0] is system.ground):
