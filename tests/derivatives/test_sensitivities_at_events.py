@@ -108,6 +108,15 @@ def test_parameter_that_moves_a_jump_and_nothing_else() -> None:
     assert run.x[-1, 0] == pytest.approx(3 * 0.7 * (2 - 0.35), rel=1e-6)
 
 
+def test_parameter_that_moves_only_a_later_zero_of_a_surface() -> None:
+    """A force of 3 where t - 1/2 is below (2 + p) max(t - 1, 0): until 1/2 for every p, and from (3/2 + p)/(1 + p) on."""
+    p, end = sd.parameters("p"), 2.2 / 1.7
+    module = _spring(sp.Piecewise((3, sd.t - 0.5 - (2 + p) * sp.Max(sd.t - 1, 0) < 0), (0, True)))
+    with pytest.warns(SimulationWarning, match="p moves a jump of the right-hand side, where .* passes zero, and nothing else"):
+        run = module.simulate((0, 2), sensitivities=["p"], rtol=1e-9)
+    assert run.x[-1, 0] == pytest.approx(3 * 0.5 * 1.75 + 3 * (2 - end)**2 / 2, rel=1e-6)
+
+
 def test_law_in_pieces_that_does_not_jump() -> None:
     """A spring with a gap on each side is continuous where its pieces meet."""
     x, p = sd.coordinates("x"), sd.parameters("p")

@@ -200,10 +200,11 @@ def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Seq
     signs = np.sign(module.evaluate("switches", t, x, request.p, inputs))
     result: dict[str, str] = {}
     for k, jump in enumerate(metadata.switches):
-        for row in np.flatnonzero(signs[1:, k] * signs[:-1, k] <= 0)[:1]:
-            J = module.jacobian(t[row], x[row], request.p, inputs[row], ["params", "inputs"], "switches")
-            by = np.hstack([np.asarray(J.params)[k], np.asarray(J.inputs)[k]])
-            known = dict(zip((*metadata.parameters, *metadata.inputs), by, strict=True))
+        rows = np.flatnonzero(signs[1:, k] * signs[:-1, k] <= 0)
+        if len(rows):
+            J = module.jacobian(t[rows], x[rows], request.p, inputs[rows], ["params", "inputs"], "switches")
+            by = np.concatenate([np.asarray(J.params)[:, k], np.asarray(J.inputs)[:, k]], axis=1).any(axis=0)
+            known = dict(zip((*metadata.parameters, *metadata.inputs), by.tolist(), strict=True))
             result |= {name: jump.surface for name in asked if known[name] and name not in result}
     return result
 
