@@ -101,6 +101,20 @@ def test_as_many_steps_and_evaluations_as_without() -> None:
         assert kept.corrections.n_evaluations <= 2.1 * kept.n_steps + 10
 
 
+@pytest.mark.parametrize("method", ["dop853", "DOP853", "RK45"])
+def test_corrections_are_what_they_change(method: str) -> None:
+    """Of one step, against the same step without them."""
+    pendulum = module("pendulum_absolute")
+    n_q = pendulum.metadata.sizes.q
+    free, kept = (pendulum.simulate(np.array([0, 0.5]), rtol=0.1, atol=0.1, first_step=0.5, method=method, stabilization=s)
+                  for s in ("none", "projection"))
+    assert kept.n_steps == kept.corrections.n_steps == 1
+    off = kept.x[-1] - free.x[-1]
+    found = kept.corrections
+    assert min(found.position, found.speed) > 1e-6
+    assert [found.position, found.speed] == pytest.approx([np.linalg.norm(off[:n_q]), np.linalg.norm(off[n_q:])], rel=1e-6)
+
+
 def test_output_times_do_not_change_the_steps() -> None:
     ends, many = (module("four_bar").simulate(t, rtol=1e-8) for t in (np.array([0.0, 3.0]), np.linspace(0, 3, 777)))
     assert ends.n_steps == many.n_steps
