@@ -1,5 +1,6 @@
 """Motions with rigid contacts against closed forms."""
 
+import itertools
 import os
 import pickle
 import re
@@ -139,17 +140,19 @@ def test_block_slips_whatever_rounding_makes_of_a_force_that_begins_at_the_bound
 @BY_TCC
 def test_block_is_lifted_whatever_rounding_makes_of_a_force_that_begins_at_its_weight(
         compiler: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The force f + c t upward on a block that slips, f its weight to a few units in the last place: y = c t^3/6m."""
+    """The force f + c (t - t_0) upward on a block that slips, f its weight to a few units in the last place; the motion begins
+    at t_0, and y = c (t - t_0)^3/6m."""
     compile_by(monkeypatch, compiler)
-    c, mass, end, f = 3.0, 2.0, 2.0, sd.parameters("f")
+    c, mass, end, (f, t_0) = 3.0, 2.0, 2.0, sd.parameters("f t_0")
     system = block_on_its_sole(0.3, mass)
-    system.add_force("body", [4, f + c * sd.t])
-    system.defaults[f] = mass * G
+    system.add_force("body", [4, f + c * (sd.t - t_0)])
+    system.defaults |= {f: mass * G, t_0: 0.0}
     module = system.compile()
-    for ulps in ULPS:
-        for solution in in_c_and_in_python(module, (0, end), u=[1.0, 0.0], params={"f": ulps_from(mass * G, ulps)}, rtol=1e-11):
+    for ulps, begin in itertools.product(ULPS, (0.0, 3.0)):
+        params = {"f": ulps_from(mass * G, ulps), "t_0": begin}
+        for solution in in_c_and_in_python(module, (begin, begin + end), u=[1.0, 0.0], params=params, rtol=1e-11):
             assert solution.x[-1] == pytest.approx([end + end**2, c * end**3 / 6 / mass, 1 + 2 * end, c * end**2 / 2 / mass],
-                                                   rel=1e-9), ulps
+                                                   rel=1e-9), (ulps, begin)
 
 
 @BY_TCC
