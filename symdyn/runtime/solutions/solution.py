@@ -843,8 +843,6 @@ class Solution:
         if name in OF_FORCES and self.module.metadata.contact_groups:
             raise ArgumentError(f"{self.module.name}: {name} depends on the forces in the contact groups, which are known as "
                                 "impulses over steps alone; take them from sol.contact_groups")
-        if len(self.t) == 0:
-            return np.zeros((0, *self.module.shape(name)))
         shape = self.module.shape(name)
         if not self._phases:
             return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(len(self.t), *shape)
