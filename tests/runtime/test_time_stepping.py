@@ -96,6 +96,7 @@ def test_a_block_on_a_slope_stays_or_slides_as_in_closed_form(friction: float) -
     weight = sum(solution.contacts[f"corner_{k}"].force[-1, 0] for k in range(1, 5))
     assert weight == pytest.approx(2 * G * np.cos(angle), rel=1e-10)
     assert solution.stepped is not None and solution.stepped.residual < 1e-11 and solution.stepped.depth < 1e-11
+    assert (solution.n_steps, solution.n_rejected) == (200, 0)
 
 
 def test_a_tumbling_block_approaches_the_run_that_locates_its_impacts() -> None:
