@@ -146,6 +146,14 @@ def test_instants_do_not_drift() -> None:
     assert len(asked) == 300 and np.array_equal(asked, 0.3 + 0.01 * np.arange(300))
 
 
+def test_an_instant_that_rounding_puts_before_the_end_is_the_end() -> None:
+    """Three times 0.3 is 0.9 but for a unit in the last place; at the end nothing is asked, and no step is as short as that."""
+    asked: list[float] = []
+    sol = cart().simulate((0, 0.9), inputs={"F": sd.Sampled(lambda t, x: asked.append(t) or t, 0.3)}, steps=True)
+    assert 3 * 0.3 < 0.9 and np.array_equal(asked, [0, 0.3, 0.6]) and len(sol.samples["F"].t) == 3
+    assert sol.t[-1] == 0.9 and np.diff(sol.t).min() > 1e-9
+
+
 # -- events, outputs, work, trials
 
 
