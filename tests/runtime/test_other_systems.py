@@ -164,6 +164,26 @@ def test_threads_leave_signals_alone() -> None:
     assert seen == [None] and signal.getsignal(signal.SIGINT) is before
 
 
+def test_ctrl_c_in_the_frame_of_a_function_waits_until_it_is_asked_for() -> None:
+    """Elsewhere it acts at once; where nothing has asked for it, it acts at the end."""
+    went_on: list[bool] = []
+
+    def pressed() -> None:
+        signal.raise_signal(signal.SIGINT)
+        went_on.append(True)
+
+    with interrupts.Interrupts(pressed.__code__) as kept:
+        pressed()
+        with pytest.raises(KeyboardInterrupt):
+            kept.check()
+        kept.check()  # only once
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), interrupts.Interrupts(pressed.__code__):
+        pressed()
+    assert went_on == [True, True]
+
+
 def test_a_handler_that_python_did_not_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a program that embeds Python, or where Ctrl-C is ignored."""
     monkeypatch.setattr(signal, "getsignal", lambda number: None)
