@@ -33,6 +33,7 @@ def test_bouncing_ball(method: str, rtol: float) -> None:
         found = ball().gradient(sd.Loss(end=sp.Symbol(name)), list(BALL), (0, 3), rtol=rtol, method=method)
         np.testing.assert_allclose(found.array, exact, rtol=0, atol=1e-10)
         assert found.value == pytest.approx(float(bounced(mp.mpf(3), mp.mpf("9.81"), mp.mpf("0.8"), mp.mpf(1))[k]), abs=1e-10)
+        assert found.n_steps == ball().simulate((0, 3), rtol=rtol, method=method).n_steps
 
 
 def area(t: Any, g: Any, e: Any, height: Any) -> Any:

@@ -173,7 +173,7 @@ class Chain:
         self.carried = tuple(dict.fromkeys([*carried, *held]))
         self.direction = 1.0 if request.span[1] >= request.span[0] else -1.0
         self.pieces: list[Way | Bridge | Jump | Instant] = []
-        self.n_steps, self.memory = 0, outcome.t.nbytes + outcome.x.nbytes
+        self.n_steps, self.memory = outcome.n_steps, outcome.t.nbytes + outcome.x.nbytes
         self.end = (request.span[0], request.x0)
         self.way: Way | None = None
 
@@ -236,7 +236,6 @@ class Chain:
 
     def _keep(self, way: Way) -> None:
         self.pieces.append(way)
-        self.n_steps += way.n_steps
         self.memory += way.memory
         self.room = max(0.0, self.room - sum(kept.bytes for kept in way.steps.values()))
 
@@ -260,7 +259,6 @@ class Chain:
                                   "the motion is cut there; take a finer rtol, or simulate(..., sensitivities=[...])")
         self._keep(way)
         self.pieces.append(bridge)
-        self.n_steps += 1
         t, x = at + bridge.length, bridge.end
         field = Field(self.module, way.request)
         jump = Jump(way, t, x, field.one_sided(t, x, -NEARBY * bridge.length), cut.events, first, NEARBY * bridge.length)
