@@ -201,6 +201,22 @@ def test_resets_of_two_events_at_once_are_made_in_the_order_of_declaration(decla
         assert run.x[-1] == pytest.approx([1 + (3 if declared == "ab" else 2), 3 if declared == "ab" else 2, 1])
 
 
+def test_what_passes_zero_as_another_event_stops_it_has_passed() -> None:
+    """y = t/2 + t^2/2 is stopped at t = 1, where it passes 1, and goes on as 1 + (t - 1)^2/2."""
+    y = sd.coordinates("y")
+    s = sd.System("stopped")
+    body = s.add_body("block", mass=1)
+    s.add_joint_force(s.add_joint(sd.Prismatic("along", s.ground, body, y, axis=[1, 0])), 1)
+    s.add_event("brake", sd.t - 1, reset={y.dot: 0})
+    s.add_event("passes", y - 1)
+    s.initial = {y.dot: 0.5}
+    equations = s.embedding()
+    for backend, method in METHODS[:4]:
+        run = equations.compile(backend=backend).simulate((0, 2), method=method, rtol=1e-10)
+        assert run.events["passes"].t == pytest.approx([1.0]) and run.events["brake"].t == pytest.approx([1.0]), method
+        assert run.x[-1] == pytest.approx([1.5, 1.0], rel=1e-7)
+
+
 def test_event_at_the_very_end_of_a_step() -> None:
     y = sd.coordinates("y")
     s = sd.System("falling", gravity=[0, -10])
