@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from fractions import Fraction
 from typing import Any
@@ -60,6 +61,16 @@ def test_evaluates_as_sympy_does(name: str) -> None:
         found = helpers.at(tape, point)["e"][()]
         assert helpers.close(found, helpers.in_sympy(_exact(expression), point))
         assert helpers.close(found, helpers.in_sympy(_exact(sp.sympify(back)), point), 1e-14)
+
+
+@pytest.mark.parametrize("name", ["sign", "floor", "ceiling", "min", "max", "heaviside", "piecewise", "nested", "logic",
+                                  "unequal"])
+def test_values_at_jumps_and_edges_are_those_of_sympy(name: str) -> None:
+    recorder, _, value = _record(EXPRESSIONS[name])
+    tape = Tape.of(recorder, e=value)
+    for place in itertools.product((Fraction(0), Fraction(1, 2), Fraction(1)), repeat=3):
+        point = dict(zip("xyz", place, strict=True))
+        assert helpers.close(helpers.at(tape, point)["e"][()], helpers.in_sympy(EXPRESSIONS[name], point)), place
 
 
 def _exact(expression: sp.Expr) -> sp.Expr:
