@@ -1046,14 +1046,15 @@ class _Phases:
         return self._onto_surfaces(t, after), rebound
 
     def _kinetic_energy(self, t: float, x: np.ndarray) -> float:
-        """The largest of the motion so far, J, which the speeds of impacts at rest are rounding of; 0 where it is not defined."""
-        if "energy" in self.module.functions:
-            request, n = self.request, self.request.n_state
-            times = np.concatenate([*(self.ts if self.most_kinetic is None else []), [t]])
-            states = np.vstack([*(self.xs if self.most_kinetic is None else []), x])[:, :n]
-            energies = self.module.evaluate("energy", times, states, request.p, request.inputs.rows(times, states))
-            self.most_kinetic = max(self.most_kinetic or 0.0, float(energies.reshape(len(times), -1)[:, 0].max()))
-        return self.most_kinetic or 0.0
+        """The largest of the motion so far, J, which the speeds of impacts at rest are rounding of."""
+        request, n = self.request, self.request.n_state
+        earlier = self.most_kinetic is None
+        times = np.concatenate([*(self.ts if earlier else []), [t]])
+        states = np.vstack([*(self.xs if earlier else []), x])[:, :n]
+        energies = self.module.evaluate("energy", times, states, request.p, request.inputs.rows(times, states))
+        most = float(energies[:, 0].max())
+        self.most_kinetic = most if self.most_kinetic is None else max(self.most_kinetic, most)
+        return self.most_kinetic
 
     def _sites(self, at: Numbers, chosen: Sequence[int], impact: bool = False) -> list[Site]:
         """The contacts of a problem, with their rows among themselves."""
