@@ -163,9 +163,10 @@ def test_auxiliary_speeds_give_the_forces_that_they_bring_in() -> None:
     P.set_vel(N, l * u * A.y + along * A.x)
     kane = KanesMethod(N, [q], [u], [q.diff() - u], u_auxiliary=[along])
     kane.kanes_equations([Particle("bob", P, m)], [(P, m * g * N.x - tension * A.x)])
-    equations = sd.from_sympy(kane, "pendulum")
+    equations = sd.from_sympy(kane, "pendulum", outputs={"speed": P.vel(N).to_matrix(A)})
     own = {s.name: s for s in (*equations.symbols.coordinates, *equations.symbols.speeds)}
     assert sd.prove(equations.explicit("output_T"), m * (g * sp.cos(own["q"]) + l * own["u"]**2)).proved
+    assert equations.explicit("output_speed") == sp.Matrix([0, l * own["u"], 0])  # no motion along an auxiliary speed
     assert equations.symbols.inputs == ()
 
 
