@@ -375,7 +375,16 @@ class Integrator:
 
 
 @dataclass(frozen=True)
-class Context:
+class NamedRecords:
+    """Records that templates get, each by its name."""
+
+    def names(self) -> dict[str, Any]:
+        """Each record by its name, as Jinja2 takes them."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class Context(NamedRecords):
     """The names that every template gets.
 
     model        the mechanism
@@ -406,7 +415,3 @@ class Context:
     lanes: Batch | None
     many: Batch | None
     reference: Reference | None
-
-    def names(self) -> dict[str, Any]:
-        """Each record by its name, as Jinja2 takes them."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}

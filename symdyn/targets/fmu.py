@@ -12,7 +12,7 @@ import warnings
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -34,6 +34,7 @@ from symdyn.runtime.building.objects import run
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import shown
+from symdyn.targets.fmu_context import Code, Description, Fmu, FmuContext, Start, Wrapped
 from symdyn.targets.fmu_description import units_of, unknowns_of, variables_of
 from symdyn.targets.start import equations_of, start_values
 from symdyn.targets.text import differentiable
@@ -41,8 +42,6 @@ from symdyn.turning import turns
 
 VERSIONS = (3, 2)
 KINDS = ("model_exchange", "co_simulation")
-# Of the description in version 2.
-_ELEMENTS = {"model_exchange": "ModelExchange", "co_simulation": "CoSimulation"}
 # Of a step of co-simulation, where the importer gives none.
 TOLERANCE = 1e-9
 # An FMU allocates memory and compares texts; the package of tcc brings neither the headers of libc nor the paths to them.
@@ -56,14 +55,6 @@ _OF_VERSION_2 = {"x86_64-linux": "linux64", "x86-linux": "linux32", "x86_64-wind
                  "x86_64-darwin": "darwin64"}
 # The same bytes for the same mechanism: files of an archive have a time.
 _DATE = (1980, 1, 1, 0, 0, 0)
-
-
-class Wrapped(NamedTuple):
-    """A function of the mechanism with the same arguments for all: a title, and the calls that it consists of."""
-
-    name: str
-    title: str
-    calls: tuple[str, ...]
 
 
 def write_fmu(module: Module, path: Any, version: int, kind: str, *, q: Any = None, u: Any = None, z: Any = None,
@@ -118,55 +109,64 @@ def source_of(equations: Equations, specialize: Mapping[Any, float] | None) -> t
 def _files(module: Module, source: Source, version: int, kind: str, start: Mapping[str, np.ndarray],
            derivatives: Sequence[str]) -> dict[str, bytes]:
     """All files of the archive but the binary, by their paths."""
+    context = _context(module, source, version, kind, start, derivatives)
+    folder = templates_folder()
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folder / "fmu"), undefined=jinja2.StrictUndefined,
+                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+
+    def made(template: str) -> bytes:
+        return environment.get_template(template).render(context.names()).encode()
+
+    files = {"modelDescription.xml": made(f"fmi{version}.xml.jinja")}
+    files |= {f"sources/{name}": content.encode() for name, content in source.files.items()}
+    files["sources/fmu_model.h"] = made("model.h.jinja")
+    files |= {f"sources/{name}": (folder / "fmu" / name).read_bytes() for name in ("instance.h", _entry(version))}
+    if version == 3:
+        files["sources/buildDescription.xml"] = made("build.xml.jinja")
+    return files
+
+
+def _context(module: Module, source: Source, version: int, kind: str, start: Mapping[str, np.ndarray],
+             derivatives: Sequence[str]) -> FmuContext:
     metadata, of_code = module.metadata, source.metadata
     variables, at = variables_of(metadata, start)
     units, variables = units_of(variables)
     outputs, rates = unknowns_of(metadata, at, module.structure, of_code.arguments, of_code.shapes)
     constrained = all(n in of_code.shapes for n in CORRECTIONS)
     n_rows = of_code.shapes[VIOLATION][0] // 2 if constrained else 0
-    places = {n: k for k, n in enumerate(metadata.x)}
-    entry = f"fmi{version}.c"
-    sources = [f"{of_code.name}.c", entry]
     text = next(iter(source.files.values()))
-    digits = text.split("Model hash ", 1)[1][:16]
-    context = {
-        "name": of_code.name, "title": module.name, "version": symdyn.__version__, "kind": kind, "element": _ELEMENTS[kind],
-        "hash": digits,
-        "token": f"{of_code.name}-{digits}-fmi{version}-{kind}", "tolerance": repr(TOLERANCE),
-        "duration": repr(metadata.duration or 1.0),
-        "description": f"{metadata.formulation} equations of motion of {module.name}, {len(metadata.bodies)} bodies",
-        "sizes": [("N_Q", len(metadata.q)), ("N_U", len(metadata.u)), ("N_X", at.n_x), ("N_INPUTS", at.n_inputs), ("N_P", at.n_p),
-                  ("N_C", of_code.n_c), ("N_OUTPUTS", at.n_outputs), ("N_EVENTS", len(metadata.events)), ("N_ROWS", n_rows)],
-        "projects": constrained or bool(metadata.unit_groups), "differentiable": bool(derivatives),
-        "by_parameters": "jacobian_params" in derivatives, "n_rows": n_rows,
-        "start": {key: [repr(float(v)) for v in values] for key, values in start.items()},
-        "motions": [[metadata.inputs.index(f"{m}{suffix}") for suffix in ("", "_dot", "_ddot")] for m in metadata.motions],
-        "turning": [turns(metadata.units.get(n)) for n in metadata.u], "unit_groups": _padded(metadata, places),
-        "events": metadata.events, "functions": _wrapped(of_code, metadata, at.n_outputs, derivatives),
-        "units": units, "variables": variables, "outputs": outputs, "rates": rates,
-        "unknown": [v.reference for v in variables if v.initial == "calculated" and not v.name.startswith("event.")],
-        "indicators": range(at.events, at.events + len(metadata.events)), "n_indicators": len(metadata.events),
-        "sources": sources, "libraries": sys.platform != "win32"}
-    folder = templates_folder()
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folder / "fmu"), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
-
-    def made(template: str) -> bytes:
-        return environment.get_template(template).render(context).encode()
-
-    files = {"modelDescription.xml": made(f"fmi{version}.xml.jinja")}
-    files |= {f"sources/{name}": content.encode() for name, content in source.files.items()}
-    files["sources/fmu_model.h"] = made("model.h.jinja")
-    files |= {f"sources/{name}": (folder / "fmu" / name).read_bytes() for name in ("instance.h", entry)}
-    if version == 3:
-        files["sources/buildDescription.xml"] = made("build.xml.jinja")
-    return files
+    fmu = Fmu(
+        name=of_code.name, title=module.name,
+        about=f"{metadata.formulation} equations of motion of {module.name}, {len(metadata.bodies)} bodies",
+        version=symdyn.__version__, fmi=version, hash=text.split("Model hash ", 1)[1][:16], kind=kind,
+        duration=repr(metadata.duration or 1.0), tolerance=repr(TOLERANCE), sources=(f"{of_code.name}.c", _entry(version)),
+        math_library=sys.platform != "win32")
+    description = Description(
+        units=tuple(units), variables=tuple(variables), outputs=tuple(outputs), rates=tuple(rates),
+        unknown=tuple(v.reference for v in variables if v.initial == "calculated" and not v.name.startswith("event.")),
+        indicators=tuple(range(at.events, at.events + len(metadata.events))))
+    code = Code(
+        sizes=(("N_Q", len(metadata.q)), ("N_U", len(metadata.u)), ("N_X", at.n_x), ("N_INPUTS", at.n_inputs), ("N_P", at.n_p),
+               ("N_C", of_code.n_c), ("N_OUTPUTS", at.n_outputs), ("N_EVENTS", len(metadata.events)), ("N_ROWS", n_rows)),
+        start=Start(**{key: tuple(repr(float(v)) for v in values) for key, values in start.items()}),
+        projects=constrained or bool(metadata.unit_groups), differentiable=bool(derivatives),
+        by_parameters="jacobian_params" in derivatives, n_rows=n_rows,
+        turning=tuple(turns(metadata.units.get(n)) for n in metadata.u),
+        motions=tuple(tuple(metadata.inputs.index(f"{m}{suffix}") for suffix in ("", "_dot", "_ddot")) for m in metadata.motions),
+        unit_groups=_padded(metadata), events=metadata.events,
+        functions=tuple(_wrapped(of_code, metadata, at.n_outputs, derivatives)))
+    return FmuContext(fmu, description, code)
 
 
-def _padded(metadata: ModuleMetadata, places: Mapping[str, int]) -> list[list[int]]:
+def _entry(version: int) -> str:
+    """The file with the functions of a version of the interface."""
+    return f"fmi{version}.c"
+
+
+def _padded(metadata: ModuleMetadata) -> tuple[tuple[int, ...], ...]:
     """Entries of x that form unit vectors, filled up with -1 to the same length."""
     longest = max((len(group) for group in metadata.unit_groups), default=0)
-    return [[*(places[n] for n in group), *[-1] * (longest - len(group))] for group in metadata.unit_groups]
+    return tuple((*(metadata.x.index(n) for n in group), *[-1] * (longest - len(group))) for group in metadata.unit_groups)
 
 
 def _wrapped(of_code: Any, metadata: ModuleMetadata, n_outputs: int, derivatives: Sequence[str]) -> list[Wrapped]:

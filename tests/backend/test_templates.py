@@ -8,23 +8,25 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from symdyn.backend.context import Algorithms, Calls, Context, Integrator, Manifold, Model, Needs, Options
+from symdyn.backend.context import Algorithms, Calls, Context, Integrator, Manifold, Model, NamedRecords, Needs, Options
 from symdyn.backend.dialect import identifier
 from symdyn.backend.function import Function
 from symdyn.backend.program import Program
 from symdyn.backend.reference import Reference
 from symdyn.backend.source import backends, template_folders
-from symdyn.errors import SymdynError
+from symdyn.errors import CompilerWarning, SymdynError
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit, write_source
+from symdyn.targets import fmu
+from symdyn.targets.fmu_context import Code, Description, Fmu, FmuContext
 from tests.helpers import swept
 
 HERE = Path(__file__).parent
@@ -237,36 +239,57 @@ def members(record: type) -> set[str]:
 @pytest.mark.parametrize(("heading", "record"), [
     ("model", Model), ("options", Options), ("calls", Calls), ("needs", Needs), ("algorithms", Algorithms),
     ("manifold", Manifold), ("integrator", Integrator), ("program", Program), ("functions", Function),
-    ("reference", Reference)])
+    ("reference", Reference), ("fmu", Fmu), ("description", Description), ("code", Code)])
 def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
     """Every name in the table of a record is there, and every name that is there is in the table."""
     assert listed(f"### {heading}\n") == members(record)
 
 
 @pytest.fixture
-def context(derived: Callable[..., Any]) -> Context:
-    """What the templates of a module in C get."""
-    seen: list[Context] = []
+def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
+    """What the templates of a module in C and of an FMU get."""
+    seen: dict[type, NamedRecords] = {}
 
-    def spy(self: Context) -> dict[str, Any]:
-        seen.append(self)
+    def spy(self: NamedRecords) -> dict[str, Any]:
+        seen.setdefault(type(self), self)
         return names(self)
 
-    names = Context.names
+    names = NamedRecords.names
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Context, "names", spy)
+        patch.setattr(NamedRecords, "names", spy)
+        patch.setattr(fmu, "find_compiler", lambda: None)
         emit(derived("pendulum"), "c")
-    return seen[0]
+        with pytest.warns(CompilerWarning, match="sources and no binary"):
+            derived("pendulum").compile(backend="numpy").to_fmu(tmp_path / "pendulum.fmu")
+    return seen
 
 
-def test_readme_lists_what_templates_get(context: Context) -> None:
-    assert listed("## What a template gets\n") == set(context.names())
+@pytest.mark.parametrize(("heading", "record"), [
+    ("What a template gets", Context), ("What the templates of an FMU get", FmuContext)])
+def test_readme_lists_what_templates_get(heading: str, record: type, contexts: dict[type, NamedRecords]) -> None:
+    assert listed(f"## {heading}\n") == set(contexts[record].names())
 
 
-def test_records_of_templates_are_frozen(context: Context) -> None:
+def records_in(value: Any) -> Iterator[Any]:
+    """Records, and what they hold that may be changed."""
+    if dataclasses.is_dataclass(value):
+        yield value
+        for field in dataclasses.fields(value):
+            yield from records_in(getattr(value, field.name))
+    elif isinstance(value, tuple):
+        for entry in value:
+            yield from records_in(entry)
+    elif isinstance(value, (list, dict, set)):
+        yield value
+
+
+def test_records_of_templates_are_frozen(contexts: dict[type, NamedRecords]) -> None:
+    context = contexts[Context]
+    assert isinstance(context, Context)
     records = [context, *[r for r in context.names().values() if dataclasses.is_dataclass(r)], context.program.prologue]
     assert len(records) == 11
-    for record in records:
+    targets = [*records_in(contexts[FmuContext])]
+    for record in [*records, *targets]:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(record, dataclasses.fields(record)[0].name, None)
 
