@@ -9,16 +9,18 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from textwrap import fill
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 import numpy as np
 
 import symdyn
 from symdyn.arguments import some
+from symdyn.backend.context import Algorithms
 from symdyn.backend.dialect import Dialect, read_dialect
 from symdyn.backend.metadata import EventRecord, ModuleMetadata, ValidityRange
 from symdyn.backend.reference import result_at
@@ -37,8 +39,18 @@ from symdyn.functions.tapes import has_function
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path, writing
 from symdyn.tape.external import UserFunction
-from symdyn.tape.intrinsics import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Tape
+from symdyn.targets.modelica_context import (
+    Clause,
+    Declared,
+    ModelicaContext,
+    ModelicaEquations,
+    ModelicaModel,
+    Sample,
+    Variable,
+    Violation,
+)
+from symdyn.targets.modelica_equations import Equations as FlatEquations
 from symdyn.targets.modelica_equations import Flat, combined
 from symdyn.targets.start import equations_of, start_values
 
@@ -52,43 +64,6 @@ SAMPLES, REACH, COARSEST = 3, 0.3, 1e-6
 UNIT, VIOLATED = "1e-6", "1e-3"
 _FUNCTIONS = ("rhs", "outputs", "energy", "events", "event_resets", "validity_checks")
 _OWN_FUNCTIONS = ("symdyn_asinh", "symdyn_acosh", "symdyn_atanh", "symdyn_erf")
-
-
-class Variable(NamedTuple):
-    """What is declared: its name with its size, attributes in brackets, the value it is bound to, a description."""
-
-    name: str
-    attributes: str
-    value: str
-    about: str
-
-
-class Clause(NamedTuple):
-    """What happens when a condition becomes true: values that states are set to, and the words that a simulation ends with."""
-
-    condition: str
-    resets: tuple[tuple[str, str], ...]
-    stops: str
-
-
-class Sample(NamedTuple):
-    """An instance of the model in the test: its modifications, the rates of its states under a name, and pairs of a claim and
-    what it means if it does not hold."""
-
-    name: str
-    modifications: str
-    rates: str
-    states: tuple[str, ...]
-    claims: tuple[tuple[str, str], ...]
-
-
-class _Violation(NamedTuple):
-    """What the largest of some residuals is called, with its unit."""
-
-    name: str
-    unit: str
-    about: str
-    residuals: tuple[str, ...]
 
 
 def write_modelica(module: Module, folder: Any, *, q: Any = None, u: Any = None, z: Any = None, params: Any = None,
@@ -105,10 +80,10 @@ def write_modelica(module: Module, folder: Any, *, q: Any = None, u: Any = None,
     with collector_paused():
         content = _content(whole, specialize)
         dialect = read_dialect(templates_folder() / FOLDER / "equations")
-        context, name = _context(module.metadata, content, dialect, start)
+        context = _context(module.metadata, content, dialect, start)
         environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
                                          trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
-        files = {file.format(name=name): environment.get_template(f"{FOLDER}/{template}").render(context)
+        files = {file.format(name=context.model.name): environment.get_template(f"{FOLDER}/{template}").render(context.names())
                  for template, file in (dialect.files or {}).items()}
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
@@ -125,9 +100,7 @@ def _content(equations: Equations, specialize: Mapping[Any, float] | None) -> Co
     return with_violation(content_of(equations, names, True, bound, RightSide(baumgarte=constrained)))
 
 
-def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
-             start: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], str]:
-    """What the templates lay out, and the name of the model."""
+def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect, start: Mapping[str, np.ndarray]) -> ModelicaContext:
     names = [n for n in (*_FUNCTIONS, VIOLATION, "length") if n in content.tapes]
     whole = combined(content, names)
     tape = whole.tape
@@ -140,42 +113,52 @@ def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
     outputs = [(variable_name(output, taken), shape, metadata.output_units.get(output, "")) for output, shape in metadata.outputs]
     events = [variable_name(f"event_{e.name}", taken) for e in metadata.events]
     flat = Flat(dialect, whole, identifiers, taken, codes).equations()
-    reasons = {f"reasons[{code}]": f'"{_quoted(reason)}"' for reason, code in codes.items()}
-    asserts = [re.sub(r"reasons\[\d+\]", lambda result: reasons[result[0]], line) for line in flat.asserts]
     intrinsics = {n.args[0].name for n in tape.steps if n.op == "call" and not isinstance(n.args[0], UserFunction)}
     user_texts = texts_of_user_functions(called(tape), FOLDER, name)
-    x = [identifiers[n] for n in metadata.x]
-    values, residuals = _entries_of(outputs), flat.results.get(VIOLATION, ())
     body = repr(flat) + repr(user_texts)
     _check_intrinsics(content.name, intrinsics)
-    context = {
-        "name": name, "title": _quoted(f"{metadata.formulation} equations of motion of {metadata.name}"),
-        "version": symdyn.__version__, "hash": hashlib.sha256(body.encode()).hexdigest()[:16],
-        "duration": repr(metadata.duration or 1.0),
-        "parameters": [*_parameters(metadata, identifiers, start["p"]),
-                       *[Variable("baumgarte", '(unit="1/s")', f" = {GAIN!r}", "gain that pulls violated constraints back")
-                         for _ in range(BAUMGARTE in content.groups["p"])]],
-        "inputs": [_real(identifiers[n], metadata.units.get(n, ""), "input", start=value)
-                   for n, value in zip(metadata.inputs, start["inputs"], strict=True)],
-        "states": _states(metadata, identifiers, start["x"]), "outputs": _outputs(outputs, "energy" in content.tapes),
-        "constants": flat.constants, "declared": _lines(flat.declared), "sections": flat.sections, "asserts": asserts,
-        "rates": list(zip(x, flat.results["rhs"], strict=True)),
-        "values": list(zip([*values, *(("kinetic_energy", "potential_energy") if "energy" in content.tapes else ())],
-                           [*flat.results.get("outputs", ()), *flat.results.get("energy", ())], strict=True)),
-        "events": list(zip(events, flat.results.get("events", ()), strict=True)),
-        "clauses": _clauses(metadata, x, events, flat.results.get("event_resets", ())),
-        "validity_checks": [(" and ".join(_within(w, value)), _message(w.message, value))
-                    for w, value in zip(metadata.validity_checks, flat.results.get("validity_checks", ()), strict=True)
-                    if not w.summed and _within(w, value)],
-        "violations": [v for v in (
-            _Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),
-            _Violation("violation_rate", "m/s", "rate of a violation", _moving(residuals[len(residuals) // 2:]))) if v.residuals],
-        "length": flat.results.get("length", ("1",))[0], "violated": VIOLATED,
-        "intrinsics": sorted(intrinsics), "user_texts": user_texts,
-        "own": [f for f in _OWN_FUNCTIONS if f"{f}(" in body],
-        "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
-        "samples": _samples(metadata, content, identifiers, values, start)}
-    return context, name
+    entries = _entries_of(outputs)
+    return ModelicaContext(
+        model=ModelicaModel(name, _quoted(f"{metadata.formulation} equations of motion of {metadata.name}"), symdyn.__version__,
+                            hashlib.sha256(body.encode()).hexdigest()[:16], repr(metadata.duration or 1.0)),
+        declared=_declared(metadata, content, identifiers, outputs, flat, start),
+        equations=_equations(metadata, flat, codes, [identifiers[n] for n in metadata.x], entries, events),
+        algorithms=Algorithms(tuple(sorted(intrinsics)), (), ()), functions=tuple(f for f in _OWN_FUNCTIONS if f"{f}(" in body),
+        user_texts=tuple(user_texts), samples=tuple(_samples(metadata, content, identifiers, entries, start)))
+
+
+def _declared(metadata: ModuleMetadata, content: Content, identifiers: Mapping[str, str],
+              outputs: Sequence[tuple[str, tuple[int, ...], str]], flat: FlatEquations,
+              start: Mapping[str, np.ndarray]) -> Declared:
+    stabilized = [Variable("baumgarte", '(unit="1/s")', f" = {GAIN!r}", "gain that pulls violated constraints back")
+                  for _ in range(BAUMGARTE in content.groups["p"])]
+    inputs = [_real(identifiers[n], metadata.units.get(n, ""), "input", start=value)
+              for n, value in zip(metadata.inputs, start["inputs"], strict=True)]
+    return Declared(
+        parameters=(*_parameters(metadata, identifiers, start["p"]), *stabilized), inputs=tuple(inputs),
+        states=tuple(_states(metadata, identifiers, start["x"])), outputs=tuple(_outputs(outputs, "energy" in content.tapes)),
+        constants=flat.constants, steps=tuple(_lines(flat.declared)))
+
+
+def _equations(metadata: ModuleMetadata, flat: FlatEquations, codes: Mapping[str, int], x: Sequence[str], entries: Sequence[str],
+               events: Sequence[str]) -> ModelicaEquations:
+    """Equations with the variables of the states, of the entries of the outputs and of the events."""
+    reasons = {f"reasons[{code}]": f'"{_quoted(reason)}"' for reason, code in codes.items()}
+    asserts = [re.sub(r"reasons\[\d+\]", lambda result: reasons[result[0]], line) for line in flat.asserts]
+    residuals = flat.results.get(VIOLATION, ())
+    violations = (Violation("violation", "m", "violation of a constraint, as a length", _moving(residuals[:len(residuals) // 2])),
+                  Violation("violation_rate", "m/s", "rate of a violation", _moving(residuals[len(residuals) // 2:])))
+    energies = ("kinetic_energy", "potential_energy") if "energy" in flat.results else ()
+    values = *flat.results.get("outputs", ()), *flat.results.get("energy", ())
+    checks = zip(metadata.validity_checks, flat.results.get("validity_checks", ()), strict=True)
+    return ModelicaEquations(
+        sections=flat.sections, asserts=tuple(asserts), rates=tuple(zip(x, flat.results["rhs"], strict=True)),
+        values=tuple(zip((*entries, *energies), values, strict=True)),
+        violations=tuple(v for v in violations if v.residuals), violated=VIOLATED, length=flat.results.get("length", ("1",))[0],
+        validity_checks=tuple((" and ".join(_within(w, value)), _message(w.message, value))
+                              for w, value in checks if not w.summed and _within(w, value)),
+        events=tuple(zip(events, flat.results.get("events", ()), strict=True)),
+        clauses=tuple(map(tuple, _clauses(metadata, x, events, flat.results.get("event_resets", ())))))
 
 
 def variable_name(name: str, taken: set[str]) -> str:
@@ -244,7 +227,7 @@ def _outputs(outputs: Sequence[tuple[str, tuple[int, ...], str]], energy: bool) 
         variable = _real(name, unit, "output")
         size = f"[{', '.join(map(str, shape))}]" if shape else ""
         attributes = variable.attributes.replace("(unit", "(each unit") if shape else variable.attributes
-        result.append(variable._replace(name=f"{name}{size}", attributes=attributes))
+        result.append(replace(variable, name=f"{name}{size}", attributes=attributes))
     return result + [_real(f"{kind}_energy", "J", f"{kind} energy") for kind in ("kinetic", "potential") if energy]
 
 

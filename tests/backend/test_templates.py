@@ -27,6 +27,7 @@ from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit, write_source
 from symdyn.targets import fmu
 from symdyn.targets.fmu_context import Code, Description, Fmu, FmuContext
+from symdyn.targets.modelica_context import Declared, ModelicaContext, ModelicaEquations, ModelicaModel
 from tests.helpers import swept
 
 HERE = Path(__file__).parent
@@ -239,7 +240,8 @@ def members(record: type) -> set[str]:
 @pytest.mark.parametrize(("heading", "record"), [
     ("model", Model), ("options", Options), ("calls", Calls), ("needs", Needs), ("algorithms", Algorithms),
     ("manifold", Manifold), ("integrator", Integrator), ("program", Program), ("functions", Function),
-    ("reference", Reference), ("fmu", Fmu), ("description", Description), ("code", Code)])
+    ("reference", Reference), ("fmu", Fmu), ("description", Description), ("code", Code),
+    ("model in Modelica", ModelicaModel), ("declared", Declared), ("equations", ModelicaEquations)])
 def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
     """Every name in the table of a record is there, and every name that is there is in the table."""
     assert listed(f"### {heading}\n") == members(record)
@@ -247,7 +249,7 @@ def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
 
 @pytest.fixture
 def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
-    """What the templates of a module in C and of an FMU get."""
+    """What the templates of a module in C, an FMU and a Modelica model get."""
     seen: dict[type, NamedRecords] = {}
 
     def spy(self: NamedRecords) -> dict[str, Any]:
@@ -261,11 +263,13 @@ def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRec
         emit(derived("pendulum"), "c")
         with pytest.warns(CompilerWarning, match="sources and no binary"):
             derived("pendulum").compile(backend="numpy").to_fmu(tmp_path / "pendulum.fmu")
+        derived("pendulum").compile(backend="numpy").to_modelica(tmp_path / "modelica")
     return seen
 
 
 @pytest.mark.parametrize(("heading", "record"), [
-    ("What a template gets", Context), ("What the templates of an FMU get", FmuContext)])
+    ("What a template gets", Context), ("What the templates of an FMU get", FmuContext),
+    ("What the templates of a Modelica model get", ModelicaContext)])
 def test_readme_lists_what_templates_get(heading: str, record: type, contexts: dict[type, NamedRecords]) -> None:
     assert listed(f"## {heading}\n") == set(contexts[record].names())
 
@@ -288,7 +292,7 @@ def test_records_of_templates_are_frozen(contexts: dict[type, NamedRecords]) -> 
     assert isinstance(context, Context)
     records = [context, *[r for r in context.names().values() if dataclasses.is_dataclass(r)], context.program.prologue]
     assert len(records) == 11
-    targets = [*records_in(contexts[FmuContext])]
+    targets = [*records_in(contexts[FmuContext]), *records_in(contexts[ModelicaContext])]
     for record in [*records, *targets]:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(record, dataclasses.fields(record)[0].name, None)
