@@ -6,6 +6,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ import jinja2
 
 import symdyn
 from symdyn.arguments import some
+from symdyn.backend.context import NamedRecords
+from symdyn.backend.metadata import Sizes
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS, render
 from symdyn.collector import collector_paused
@@ -32,6 +35,34 @@ _COPIED = {"clock.h": "test/clock.h", "cortex_m/startup.c": "cortex_m/startup.c"
 # Copies of a function that a compiler specializes have its name and a suffix.
 _USAGE = re.compile(r":(\w+)(?:\.[\w.]+)?\t(\d+)\t")
 _CALL = re.compile(r"^(?:static )?(?:inline )?(?:int|double|void|const char \*|symdyn_real) ?\*?(\w+)\(.*\{$")
+
+
+@dataclass(frozen=True)
+class Package:
+    """The package: its name, how its equations were derived, the version of symdyn, whether it calls numeric algorithms."""
+
+    name: str
+    formulation: str
+    version: str
+    sizes: Sizes
+    intrinsics: bool
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Bytes of stack by function as a compiler states them; deepest: of the deepest chain of calls."""
+
+    compiler: str
+    functions: tuple[tuple[str, int], ...]
+    deepest: int
+
+
+@dataclass(frozen=True)
+class PackageContext(NamedRecords):
+    """The names that the page of a package gets, listed in templates/README.md; stack: none without gcc."""
+
+    package: Package
+    stack: Stack | None
 
 
 def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
@@ -59,12 +90,13 @@ def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
             written[-1].parent.mkdir(parents=True, exist_ok=True)
             written[-1].write_text((templates_folder() / BACKEND / name).read_text(encoding="utf-8"), encoding="utf-8")
         stacks, compiler = stack_of(folder, metadata.name)
+        chain = deepest(folder / "src" / f"{metadata.name}.c", stacks) if stacks else 0
+        context = PackageContext(
+            Package(metadata.name, metadata.formulation, symdyn.__version__, metadata.sizes, bool(source.program.intrinsics)),
+            Stack(compiler, tuple(sorted(stacks.items())), chain) if stacks else None)
         environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder() / BACKEND), trim_blocks=True,
                                          undefined=jinja2.StrictUndefined, lstrip_blocks=True, keep_trailing_newline=True)
-        text = environment.get_template("README.md.jinja").render(
-            name=metadata.name, version=symdyn.__version__, formulation=metadata.formulation, sizes=metadata.sizes,
-            stacks=sorted(stacks.items()), stack_compiler=compiler, intrinsics=source.program.intrinsics,
-            deepest=deepest(folder / "src" / f"{metadata.name}.c", stacks) if stacks else 0)
+        text = environment.get_template("README.md.jinja").render(context.names())
         written.append(folder / "README.md")
         written[-1].write_text(text, encoding="utf-8")
     return written

@@ -26,6 +26,7 @@ from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit, write_source
 from symdyn.targets import fmu
+from symdyn.targets.cmake import Package, PackageContext, Stack
 from symdyn.targets.fmu_context import Code, Description, Fmu, FmuContext
 from symdyn.targets.modelica_context import Declared, ModelicaContext, ModelicaEquations, ModelicaModel
 from tests.helpers import swept
@@ -241,7 +242,8 @@ def members(record: type) -> set[str]:
     ("model", Model), ("options", Options), ("calls", Calls), ("needs", Needs), ("algorithms", Algorithms),
     ("manifold", Manifold), ("integrator", Integrator), ("program", Program), ("functions", Function),
     ("reference", Reference), ("fmu", Fmu), ("description", Description), ("code", Code),
-    ("model in Modelica", ModelicaModel), ("declared", Declared), ("equations", ModelicaEquations)])
+    ("model in Modelica", ModelicaModel), ("declared", Declared), ("equations", ModelicaEquations), ("package", Package),
+    ("stack", Stack)])
 def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
     """Every name in the table of a record is there, and every name that is there is in the table."""
     assert listed(f"### {heading}\n") == members(record)
@@ -249,7 +251,7 @@ def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
 
 @pytest.fixture
 def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
-    """What the templates of a module in C, an FMU and a Modelica model get."""
+    """What the templates of a module in C, an FMU, a Modelica model and the page of a firmware package get."""
     seen: dict[type, NamedRecords] = {}
 
     def spy(self: NamedRecords) -> dict[str, Any]:
@@ -264,12 +266,14 @@ def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRec
         with pytest.warns(CompilerWarning, match="sources and no binary"):
             derived("pendulum").compile(backend="numpy").to_fmu(tmp_path / "pendulum.fmu")
         derived("pendulum").compile(backend="numpy").to_modelica(tmp_path / "modelica")
+        derived("pendulum").to_cmake(tmp_path / "firmware")
     return seen
 
 
 @pytest.mark.parametrize(("heading", "record"), [
     ("What a template gets", Context), ("What the templates of an FMU get", FmuContext),
-    ("What the templates of a Modelica model get", ModelicaContext)])
+    ("What the templates of a Modelica model get", ModelicaContext),
+    ("What the page of a firmware package gets", PackageContext)])
 def test_readme_lists_what_templates_get(heading: str, record: type, contexts: dict[type, NamedRecords]) -> None:
     assert listed(f"## {heading}\n") == set(contexts[record].names())
 
@@ -292,7 +296,7 @@ def test_records_of_templates_are_frozen(contexts: dict[type, NamedRecords]) -> 
     assert isinstance(context, Context)
     records = [context, *[r for r in context.names().values() if dataclasses.is_dataclass(r)], context.program.prologue]
     assert len(records) == 11
-    targets = [*records_in(contexts[FmuContext]), *records_in(contexts[ModelicaContext])]
+    targets = [*records_in(contexts[FmuContext]), *records_in(contexts[ModelicaContext]), *records_in(contexts[PackageContext])]
     for record in [*records, *targets]:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(record, dataclasses.fields(record)[0].name, None)
