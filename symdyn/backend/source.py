@@ -161,7 +161,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     if rolled is True and dialect.loops is None:
         raise SymdynError(f"rolled=True was asked for, and the backend {backend} writes no loops; take 'c', rolled='auto', or a "
                           "dialect.toml with [loops]")
-    environment = _environment(*folders) if templates is not None else _shipped(*folders)
+    environment = template_environment(*folders) if templates is not None else _shipped(*folders)
     content = with_violation(content)
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
@@ -219,7 +219,8 @@ def _check_single(name: str, program: Program) -> None:
                                     "calls; pass precision='double'")
 
 
-def _environment(*folders: Path) -> jinja2.Environment:
+def template_environment(*folders: Path) -> jinja2.Environment:
+    """For templates of text that is no page: undefined names are errors, and block statements leave no lines behind."""
     return jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
 
@@ -234,7 +235,7 @@ def _reader(environment: jinja2.Environment) -> Callable[[str], str]:
 
 
 # Reading the templates takes longer than filling them in, and the shipped ones stay as they are.
-_shipped = functools.cache(_environment)
+_shipped = functools.cache(template_environment)
 
 
 def with_violation(content: Content) -> Content:

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 import symdyn
 from symdyn.arguments import some
 from symdyn.backend.context import NamedRecords
 from symdyn.backend.metadata import Sizes
 from symdyn.backend.right_side import RightSide
-from symdyn.backend.source import CORRECTIONS, render
+from symdyn.backend.source import CORRECTIONS, render, template_environment
 from symdyn.collector import collector_paused
 from symdyn.errors import ArgumentError
 from symdyn.folders import templates_folder
@@ -94,9 +92,7 @@ def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
         context = PackageContext(
             Package(metadata.name, metadata.formulation, symdyn.__version__, metadata.sizes, bool(source.program.intrinsics)),
             Stack(compiler, tuple(sorted(stacks.items())), chain) if stacks else None)
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder() / BACKEND), trim_blocks=True,
-                                         undefined=jinja2.StrictUndefined, lstrip_blocks=True, keep_trailing_newline=True)
-        text = environment.get_template("README.md.jinja").render(context.names())
+        text = template_environment(templates_folder() / BACKEND).get_template("README.md.jinja").render(context.names())
         written.append(folder / "README.md")
         written[-1].write_text(text, encoding="utf-8")
     return written

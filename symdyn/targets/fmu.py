@@ -14,14 +14,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 import symdyn
 from symdyn.arguments import some
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.backend.right_side import RightSide
-from symdyn.backend.source import CORRECTIONS, VIOLATION, Source, render
+from symdyn.backend.source import CORRECTIONS, VIOLATION, Source, render, template_environment
 from symdyn.collector import collector_paused
 from symdyn.errors import ArgumentError, CompileError, CompilerWarning
 from symdyn.folders import templates_folder
@@ -111,8 +110,7 @@ def _files(module: Module, source: Source, version: int, kind: str, start: Mappi
     """All files of the archive but the binary, by their paths."""
     context = _context(module, source, version, kind, start, derivatives)
     folder = templates_folder()
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folder / "fmu"), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment = template_environment(folder / "fmu")
 
     def made(template: str) -> bytes:
         return environment.get_template(template).render(context.names()).encode()

@@ -15,7 +15,6 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-import jinja2
 import numpy as np
 
 import symdyn
@@ -25,7 +24,7 @@ from symdyn.backend.dialect import Dialect, read_dialect
 from symdyn.backend.metadata import EventRecord, ModuleMetadata, ValidityRange
 from symdyn.backend.reference import result_at
 from symdyn.backend.right_side import RightSide
-from symdyn.backend.source import CORRECTIONS, VIOLATION, Content, with_violation
+from symdyn.backend.source import CORRECTIONS, VIOLATION, Content, template_environment, with_violation
 from symdyn.backend.user_functions import called
 from symdyn.backend.user_functions import texts as texts_of_user_functions
 from symdyn.collector import collector_paused
@@ -81,8 +80,7 @@ def write_modelica(module: Module, folder: Any, *, q: Any = None, u: Any = None,
         content = _content(whole, specialize)
         dialect = read_dialect(templates_folder() / FOLDER / "equations")
         context = _context(module.metadata, content, dialect, start)
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
-                                         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+        environment = template_environment(templates_folder())
         files = {file.format(name=context.model.name): environment.get_template(f"{FOLDER}/{template}").render(context.names())
                  for template, file in (dialect.files or {}).items()}
     with writing(target):
