@@ -28,7 +28,7 @@ def divide(arrays: Arrays, body: Sequence[Node], entries: Sequence[Any], longest
     later    nodes that are read after the last stretch, so that their places are not used again
     """
     before = before or {}
-    order = products_next_to_their_sums(arrays, arrays.places(body), entries)
+    order = products_next_to_their_sums(arrays, arrays.indices(body), entries)
     stretches = stretches_of([arrays.steps[k] for k in order.tolist()], longest)
     begin = len(stretches) - 1
     if len(entries) > longest:

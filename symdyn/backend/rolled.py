@@ -157,13 +157,13 @@ class Rolled:
 
     def number(self, node: Node) -> int:
         """The place of a node in what steps read; -1: none reads it."""
-        return int(self._numbers[self.arrays.place(node)])
+        return int(self._numbers[self.arrays.index(node)])
 
     def _in_order(self) -> tuple[list[_Step], np.ndarray]:
         """The steps: what sines and cosines need, these, then the rest; each result is stored as soon as it is there. And their
         places among those of the tape."""
         arrays = self.arrays
-        body = arrays.places(self.body)
+        body = arrays.indices(self.body)
         computed = np.zeros(len(arrays.steps), dtype=bool)
         computed[body] = True
         computed &= ~arrays.marked(self.at_once)
@@ -173,7 +173,7 @@ class Rolled:
         first: list[int] = []
         for k, entry in enumerate(self.entries):
             core = unsigned(entry)
-            place = arrays.place(core) if isinstance(core, Node) else -1
+            place = arrays.index(core) if isinstance(core, Node) else -1
             others.append(_Store("store", k, entry))
             (behind.setdefault(place, []) if place >= 0 and computed[place] else first).append(-len(others))
 
@@ -212,7 +212,7 @@ class Rolled:
         kept = [value for k in others for value in steps[k].args]
         cores, minus = np.full(len(reader), -1), np.zeros(len(reader), dtype=bool)
         cores[there], minus[there] = arrays.cores[source[there]], arrays.minus[source[there]]
-        cores[~there] = arrays.places(map(unsigned, kept))
+        cores[~there] = arrays.indices(map(unsigned, kept))
         minus[~there] = [unsigned(value) is not value for value in kept]
 
         read = self._among_read(cores)

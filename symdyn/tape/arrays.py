@@ -18,16 +18,16 @@ _NUMBERS = {op: k for k, op in enumerate(("leaf", *OPERATIONS))}
 
 
 class Arrays:
-    """Steps by their places, arguments before use, with all steps that they read.
+    """Steps by their indices, arguments before use, with all steps that they read.
 
     steps    the nodes
     ops      (n,) number of each operation, see `does`
     masks    (n,) what each depends on
     begins   (n + 1,) where the arguments of each begin among all
     values   the arguments of all steps, one after the other, (m,)
-    cores    (m,) of each argument the place of the step that it is without its sign; -1: it is a number or the like
+    cores    (m,) of each argument the index of the step that it is without its sign; -1: it is a number or the like
     minus    (m,) whether it has a sign
-    readers  (m,) the place of the step whose argument it is
+    readers  (m,) the index of the step whose argument it is
     """
 
     def __init__(self, steps: Sequence[Node]) -> None:
@@ -41,10 +41,10 @@ class Arrays:
         self.begins = np.concatenate(([0], np.cumsum(sizes)))
         self.values: list[Any] = list(chain.from_iterable(arguments))
         self.readers = np.repeat(np.arange(n), sizes)
-        indices = [step.index for step in steps]
-        self._places = np.full(indices[-1] + 2 if steps else 1, -1)
-        self._places[indices] = np.arange(n)
-        read = self.places(self.values)
+        recorded = [step.index for step in steps]
+        self._indices = np.full(recorded[-1] + 2 if steps else 1, -1)
+        self._indices[recorded] = np.arange(n)
+        read = self.indices(self.values)
         core = np.arange(n + 1)
         core[-1] = -1
         signs = np.flatnonzero(self.does("neg"))
@@ -66,19 +66,19 @@ class Arrays:
         """Which steps are one of these operations, (n,)."""
         return np.isin(self.ops, [_NUMBERS[op] for op in ops])
 
-    def places(self, values: Iterable[Any]) -> np.ndarray:
-        """The places of values that are steps; -1: of all else."""
-        indices = np.array([value.index if isinstance(value, Node) else -1 for value in values], dtype=np.int64)
-        return self._places[np.minimum(indices, len(self._places) - 1)]
+    def indices(self, values: Iterable[Any]) -> np.ndarray:
+        """The indices of values that are steps; -1: of all else."""
+        recorded = np.array([value.index if isinstance(value, Node) else -1 for value in values], dtype=np.int64)
+        return self._indices[np.minimum(recorded, len(self._indices) - 1)]
 
-    def place(self, node: Node) -> int:
-        """The place of a node; -1: it is no step."""
-        return int(self._places[min(node.index, len(self._places) - 1)])
+    def index(self, node: Node) -> int:
+        """The index of a node among the steps; -1: it is no step."""
+        return int(self._indices[min(node.index, len(self._indices) - 1)])
 
     def marked(self, values: Iterable[Any]) -> np.ndarray:
         """Which steps are among the values, (n,)."""
         result = np.zeros(len(self.steps) + 1, dtype=bool)
-        result[self.places(values)] = True
+        result[self.indices(values)] = True
         return result[:-1]
 
     def chosen(self, which: np.ndarray) -> tuple[Node, ...]:

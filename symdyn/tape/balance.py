@@ -88,8 +88,8 @@ class _Balancer:
         ways = {op: getattr(recorder, op) for op in ARITHMETIC}
         names, checks = self.old.recorder.names, self.old.recorder.checks
         marked = arrays.marked(names) | arrays.marked(checks)
-        places = zip(arrays.steps, self.outer.tolist(), marked.tolist(), strict=True)
-        for section, group in groupby(places, key=lambda place: place[0].section):
+        rows = zip(arrays.steps, self.outer.tolist(), marked.tolist(), strict=True)
+        for section, group in groupby(rows, key=lambda row: row[0].section):
             with recorder.section(section):
                 for node, outer, noted in group:
                     op, args = node.op, node.args

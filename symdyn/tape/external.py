@@ -121,7 +121,7 @@ class UserFunction(Intrinsic):
         """For each result the SymPy function that stands for it."""
         many = self.results > 1
         return tuple(FunctionClass(f"{self.label}_{k + 1}" if many else self.label, (Result,),
-                                   {"nargs": len(self.arguments), "intrinsic": self, "place": k})
+                                   {"nargs": len(self.arguments), "intrinsic": self, "index": k})
                      for k in range(self.results))
 
     def applied(self, arguments: Sequence[Any]) -> list[sp.Expr]:
@@ -134,10 +134,10 @@ class UserFunction(Intrinsic):
 
 
 class Result(sp.Function):
-    """One result of a function of the user; `intrinsic` is the function, `place` counts its results from 0."""
+    """One result of a function of the user; `intrinsic` is the function, `index` counts its results from 0."""
 
     intrinsic: UserFunction
-    place: int
+    index: int
     is_real = True
 
     @classmethod
@@ -145,18 +145,18 @@ class Result(sp.Function):
         return -1  # a number among the arguments does not make a number of it
 
     def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
-        return _result_at, (self.intrinsic, self.place, self.args)
+        return _result_at, (self.intrinsic, self.index, self.args)
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """The derivative by an argument, counted from 1."""
-        return self.intrinsic.slope(self.place, argindex - 1, self.args)
+        return self.intrinsic.slope(self.index, argindex - 1, self.args)
 
     def _eval_evalf(self, prec: int) -> Any:
         """Its number where all arguments are numbers."""
         if (self.intrinsic.digits or self.intrinsic.numbers) is None or not all(a.is_number and a.is_real for a in self.args):
             return None
         with mpmath.workprec(prec + 5):
-            value = self.intrinsic.precise(mpmath.mp, [a._to_mpmath(prec + 5, allow_ints=False) for a in self.args])[self.place]
+            value = self.intrinsic.precise(mpmath.mp, [a._to_mpmath(prec + 5, allow_ints=False) for a in self.args])[self.index]
             return sp.Expr._from_mpmath(value, prec) if mpmath.isfinite(value) else None
 
     def _sympystr(self, printer: Any) -> str:

@@ -30,13 +30,13 @@ class Entries:
     (n, e) at n points."""
 
     shape: tuple[int, ...]
-    places: np.ndarray
+    indices: np.ndarray
     values: np.ndarray
 
     def dense(self) -> np.ndarray:
         """(n, ...)"""
         flat = np.zeros((len(self.values), math.prod(self.shape)))
-        flat[:, self.places] = self.values
+        flat[:, self.indices] = self.values
         return flat.reshape((len(flat), *self.shape))
 
 
@@ -52,11 +52,11 @@ def evaluate_entries(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str,
         numbers = output.numbers
         there = numbers != 0
         there[[k for k, _ in output.nodes]] = True
-        places = np.flatnonzero(there)
-        entries = np.tile(numbers[places], (n, 1))
-        for column, (_, node) in zip(np.searchsorted(places, [k for k, _ in output.nodes]), output.nodes, strict=True):
+        indices = np.flatnonzero(there)
+        entries = np.tile(numbers[indices], (n, 1))
+        for column, (_, node) in zip(np.searchsorted(indices, [k for k, _ in output.nodes]), output.nodes, strict=True):
             entries[:, column] = done[node]
-        result[name] = Entries(output.shape, places, entries)
+        result[name] = Entries(output.shape, indices, entries)
     return result
 
 

@@ -85,7 +85,7 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
                 return recorder.apply("exp", take(e.exp))
             return recorder.pow(take(e.base), take(e.exp))
         if isinstance(e, Result):
-            return recorder.call(e.intrinsic, [take(a) for a in e.args])[e.place]
+            return recorder.call(e.intrinsic, [take(a) for a in e.args])[e.index]
         if isinstance(e, sp.Piecewise):
             return piecewise(e)
         if isinstance(e, sp.UnevaluatedExpr):

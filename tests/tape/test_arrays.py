@@ -15,21 +15,21 @@ from symdyn.tape.tape import unsigned
 
 
 def test_a_step_reads_others_with_and_without_a_sign() -> None:
-    """Numbers have no place, and neither has what the outputs do not reach."""
+    """Numbers have no index, and neither has what the outputs do not reach."""
     r = Recorder()
     a, b, unused = (r.leaf(name, COORDINATE) for name in "abu")
     product, twice = a * b, 2 * a
     quotient = -product / twice
     arrays = Arrays(Tape.of(r, y=[quotient - product, r.sin(quotient)]).steps)
-    place = arrays.place
-    assert [place(n) for n in (a, b, product, twice)] == [0, 1, 2, 3] and place(unused) == -1
-    assert arrays.places([b, 3, None, unused, product]).tolist() == [1, -1, -1, -1, 2]
-    assert arrays.place(r.cos(b)) == -1  # recorded later than all of these
+    index = arrays.index
+    assert [index(n) for n in (a, b, product, twice)] == [0, 1, 2, 3] and index(unused) == -1
+    assert arrays.indices([b, 3, None, unused, product]).tolist() == [1, -1, -1, -1, 2]
+    assert arrays.index(r.cos(b)) == -1  # recorded later than all of these
     assert arrays.marked([product, 7, unused]).tolist() == [n is product for n in arrays.steps]
     assert arrays.chosen(arrays.does("mul", "div")) == (product, twice, unsigned(quotient))
     everything = np.ones(len(arrays.steps), dtype=bool)
-    assert arrays.read_by(~arrays.does("neg"))[place(product)] == 2
-    assert arrays.read_by(everything)[place(twice)] == 1
+    assert arrays.read_by(~arrays.does("neg"))[index(product)] == 2
+    assert arrays.read_by(everything)[index(twice)] == 1
     assert not arrays.read_by(~everything).any()
 
 
@@ -51,4 +51,4 @@ def test_arrays_agree_with_the_nodes(name: str) -> None:
 def test_a_tape_of_numbers_has_no_steps() -> None:
     tape = Tape.of(Recorder(), y=[1, 2])
     assert tape.arrays.steps == () and tape.running == () and tape.longest_chain() == 0
-    assert tape.arrays.places([1, 2]).tolist() == [-1, -1]
+    assert tape.arrays.indices([1, 2]).tolist() == [-1, -1]

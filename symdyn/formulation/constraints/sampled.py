@@ -51,7 +51,7 @@ class Sampled:
     def of_entries(cls, entries: Entries) -> Sampled:
         """Of a matrix on a tape."""
         m, n = entries.shape
-        return cls(m, n, entries.places // max(n, 1), entries.places % max(n, 1), entries.values)
+        return cls(m, n, entries.indices // max(n, 1), entries.indices % max(n, 1), entries.values)
 
     def __len__(self) -> int:
         return len(self.values)
