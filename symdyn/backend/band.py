@@ -31,7 +31,7 @@ class Band:
     """An order of the states for elimination.
 
     sequence   (n,) of states: `reduced` coordinates that are eliminated first, `size` states of the band, those that follow
-    first      (n + 1,) for every state the first of its entries; columns: (n_e,) for every entry the place of its column in
+    first      (n + 1,) for every state the first of its entries; columns: (n_e,) for every entry the index of its column in
                the sequence
     lower, upper   diagonals of the band below and above the main one
     """

@@ -38,7 +38,7 @@ class Batch:
 
 
 def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str, Tape], titles: Mapping[str, str],
-             places: Mapping[str, tuple[str, int]], singular_fallback: Mapping[str, Tape], columns: Mapping[str, Columns],
+             leaves: Mapping[str, tuple[str, int]], singular_fallback: Mapping[str, Tape], columns: Mapping[str, Columns],
              names: Sequence[str] = ("rhs",)) -> Batch:
     """Functions of a program on vectors.
 
@@ -49,7 +49,7 @@ def batch_of(folder: Path, scalar: Dialect, program: Program, tapes: Mapping[str
     dialect = read_dialect(folder / "batch")
     dialect = replace(dialect, operations={
         op: f"{f.name}({', '.join(f'VECTOR({{{k}}})' for k in range(len(f.arguments)))})" for op, f in available.items()})
-    built = build(dialect, tapes, titles, places, singular_fallback=singular_fallback, like=program,
+    built = build(dialect, tapes, titles, leaves, singular_fallback=singular_fallback, like=program,
                   columns={name: those for name, those in columns.items() if name in names}, vectors=dialect).functions
     functions = {f.name: _whole(f.regular or f) for f in built if f.name in names}
     text = "\n".join(line for function in functions.values() for way in function.with_called for part in way.stretches

@@ -19,7 +19,7 @@ class Beginning:
     """What a function begins with.
 
     calls   functions that it calls, in this order
-    slots   what these compute and the function reads: node -> place in w; n_w: size of w
+    slots   what these compute and the function reads: node -> index in w; n_w: size of w
     done    all steps that they take
     """
 

@@ -279,7 +279,7 @@ class Corrections:
 class Manifold:
     """What holds for states.
 
-    unit_groups   places in x of vectors of length 1, such as Euler parameters
+    unit_groups   indices in x of vectors of length 1, such as Euler parameters
     corrections   none, or for constraints `n_rows`, `longest`, `turning`, `angles`
     """
 

@@ -58,7 +58,7 @@ class Loops:
     begin, end       lines around the statements of a trip; {n}: the number of trips
     carried, assign  what makes a variable that changes, and what changes it, with {name} and {value}
     integers, numbers   tables with {name} and {values}, an entry for each trip; item: what reads the entry of this trip
-    sines            takes all sines and cosines at once, of {n} angles from the first place on; puts them from {sines} and
+    sines            takes all sines and cosines at once, of {n} angles from the first index on; puts them from {sines} and
                      {cosines} on
     """
 
@@ -110,7 +110,7 @@ class Dialect:
 
     operations   op -> format of its arguments {0}, {1}, ...; infix ones are built in where absent
     assign       format of an assignment to a new variable, with {name} and {value}
-    load         formats of reading a leaf by kind ("q", "u", ..., "p", "c") with {k} its place
+    load         formats of reading a leaf by kind ("q", "u", ..., "p", "c") with {k} its index
     first        index of the first entry of an array, 0 or 1
     comment      what a comment line begins with
     sincos       sines and cosines taken all at once; None where each is an operation like any other

@@ -1,4 +1,4 @@
-"""Divides a long sequence of steps into stretches, and finds places for what one stretch hands on to later ones."""
+"""Divides a long sequence of steps into stretches, and finds slots in an array for what one stretch hands on to later ones."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Stretch = tuple[list[Node], list[Node]]
 
 def divide(arrays: Arrays, body: Sequence[Node], entries: Sequence[Any], longest: int, before: Mapping[Node, int] | None = None,
            count: int = 0, later: Collection[Node] = ()) -> tuple[list[Stretch], dict[Node, int], int]:
-    """Stretches of `body`, each with the nodes that later ones or the entries need; the place of each such node; their number.
+    """Stretches of `body`, each with the nodes that later ones or the entries need; the slot of each such node; their number.
 
     arrays   of the tape whose steps these are
-    A stretch ends with a section where it can, and has at most `longest` steps. A place is used again once the last stretch
+    A stretch ends with a section where it can, and has at most `longest` steps. A slot is used again once the last stretch
     that reads it is over. Entries are read by the last stretch; more than `longest` of them by empty stretches after all
     others, `longest` by each.
 
-    before   places of nodes that are there when the first stretch begins, among `count`
-    later    nodes that are read after the last stretch, so that their places are not used again
+    before   slots of nodes that are there when the first stretch begins, among `count`
+    later    nodes that are read after the last stretch, so that their slots are not used again
     """
     before = before or {}
     order = products_next_to_their_sums(arrays, arrays.indices(body), entries)
@@ -66,10 +66,10 @@ def divide(arrays: Arrays, body: Sequence[Node], entries: Sequence[Any], longest
 
 
 def products_next_to_their_sums(arrays: Arrays, body: np.ndarray, entries: Sequence[Any]) -> np.ndarray:
-    """Places of steps, ascending, with each product that only one sum needs just before that sum, so that both become one
+    """Indices of steps, ascending, with each product that only one sum needs just before that sum, so that both become one
     operation.
 
-    body   places of the steps that read others
+    body   indices of the steps that read others
     """
     inside = np.zeros(len(arrays.steps), dtype=bool)
     inside[body] = True

@@ -48,14 +48,14 @@ class Draft:
 class Drafts:
     """How functions of one program are written.
 
-    places    leaf name -> (group, place in it)
+    leaves    name -> (group, index in it)
     hoisted   what the prologue computes, in the same way; codes: what is returned for each reason
     late      see symdyn.backend.program
     inlined   function name -> what is written where it is used; of others: what is used once and short
     """
 
     dialect: Dialect
-    places: Mapping[str, tuple[str, int]]
+    leaves: Mapping[str, tuple[str, int]]
     hoisted: Mapping[Node, tuple[str, int]]
     codes: Mapping[str, int]
     late: set[Node]
@@ -84,7 +84,7 @@ class Drafts:
 
     def looped(self, draft: Draft, least: int) -> Function | None:
         """The function with loops for what it repeats; None where they save fewer than so many statements."""
-        made = Rolled(self.dialect, draft.tape, self.places, self.hoisted, self.codes, draft.checks, draft.body,
+        made = Rolled(self.dialect, draft.tape, self.leaves, self.hoisted, self.codes, draft.checks, draft.body,
                       draft.output.entries, self.inlined.get(draft.name))
         if made.saved < least:
             return None
@@ -103,7 +103,7 @@ class Drafts:
             Function, draft.name, draft.title, draft.output.shape, operations=count_of(draft.body),
             longest_chain=draft.tape.longest_chain())
         if not self.long(draft):
-            writer = Writer(self.dialect, draft.tape, self.places, self.hoisted, self.codes, self.late,
+            writer = Writer(self.dialect, draft.tape, self.leaves, self.hoisted, self.codes, self.late,
                             self.inlined.get(draft.name))
             part = writer.part(self._ordered(draft, draft.body, entries), entries, writer.results_of(entries), draft.checks)
             return made(part.arguments, part.loads, part.sections, part.results, inlined=frozenset(writer.printer.inline))
@@ -116,7 +116,7 @@ class Drafts:
 
     def _parts(self, draft: Draft, beginning: Beginning, later: set[Node]) -> tuple[
             list[Part], Mapping[Node, int], int, frozenset[Node]]:
-        """The parts of what is left of a function, places in w, the size of w, and what is written where it is used.
+        """The parts of what is left of a function, indices in w, the size of w, and what is written where it is used.
 
         later   nodes that are kept for what runs after them
         """
@@ -130,7 +130,7 @@ class Drafts:
         result: set[Node] = set()
         stored = {**self.hoisted, **{node: ("w", slot) for node, slot in slots.items() if node in beginning.slots}}
         for k, (stretch, kept) in enumerate(stretches, storing - len(stretches)):
-            writer = Writer(self.dialect, draft.tape, self.places, stored, self.codes, self.late, wanted)
+            writer = Writer(self.dialect, draft.tape, self.leaves, stored, self.codes, self.late, wanted)
             if k < 0:
                 part = writer.part(self._ordered(draft, stretch, kept), kept, partial(writer.keep, kept, slots), draft.checks)
                 parts.append(replace(part, stores=False))

@@ -1,7 +1,7 @@
 """The order of statements: one in which few values wait for their uses, so that compilers keep them in registers.
 
-The rounding of a statement does not depend on its place. Compilers keep the order of long functions more or less: the values that
-wait are theirs to spill, and there are more of them the longer each waits.
+The rounding of a statement does not depend on its position. Compilers keep the order of long functions more or less: the values
+that wait are theirs to spill, and there are more of them the longer each waits.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ def few_waiting(body: Sequence[Node], entries: Sequence[Any], inlined: Collectio
         chain[node] = 1 + len(merged[node]) + max((chain[user] for user in users[node]), default=0)
     left = {node: len(users[node]) + (node in kept) for node in needs}
     missing = {node: len(operands) for node, operands in needs.items()}
-    place = {node: k for k, node in enumerate(needs)}
+    index = {node: k for k, node in enumerate(needs)}
 
     def rank(node: Node) -> tuple[int, int, int]:
-        return (left[node] > 0) - sum(left[operand] == 1 for operand in needs[node]), -chain[node], place[node]
+        return (left[node] > 0) - sum(left[operand] == 1 for operand in needs[node]), -chain[node], index[node]
 
     # A rank that has become lower since is there once more.
-    heap = sorted((rank(node), place[node]) for node in needs if not missing[node])
+    heap = sorted((rank(node), index[node]) for node in needs if not missing[node])
     nodes, result, done = list(needs), list[Node](), set[Node]()
     while heap:
         node = nodes[heapq.heappop(heap)[1]]
@@ -61,11 +61,11 @@ def few_waiting(body: Sequence[Node], entries: Sequence[Any], inlined: Collectio
             if left[operand] == 1:  # its last user now frees it
                 for user in users[operand]:
                     if user not in done and not missing[user]:
-                        heapq.heappush(heap, (rank(user), place[user]))
+                        heapq.heappush(heap, (rank(user), index[user]))
         for user in users[node]:
             missing[user] -= 1
             if not missing[user]:
-                heapq.heappush(heap, (rank(user), place[user]))
+                heapq.heappush(heap, (rank(user), index[user]))
     return [*result, *(one for one in body if one not in done)]
 
 

@@ -80,12 +80,12 @@ class Program:
         return any(f.singular_fallback is not None for f in self.functions)
 
 
-def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
+def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], leaves: Mapping[str, tuple[str, int]],
           reasons: Sequence[str] = (), singular_fallback: Mapping[str, Tape] | None = None, like: Program | None = None,
           columns: Mapping[str, Columns] | None = None, vectors: Dialect | None = None, rolled: Rolling = "auto") -> Program:
     """Write every tape (function name -> tape with one output) in the dialect.
 
-    places      leaf name -> (group, place in it)
+    leaves      name -> (group, index in it)
     singular_fallback   function name -> the tape for where the first one fails
     like        the same in another dialect, whose rounding this one is to have
     columns     Jacobians whose tapes are derivatives along directions; vectors: the dialect of these
@@ -106,7 +106,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     constants = {node: k for k, node in enumerate(n for n in arrays.chosen(used & arrays.prologue) if n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
     inlined = {w.name: w.inlined for f in (*like.functions, *like.common) for w in f.with_called} if like else {}
-    drafts = Drafts(dialect, places, hoisted, codes, late, inlined)
+    drafts = Drafts(dialect, leaves, hoisted, codes, late, inlined)
     vectored = [name for name in tapes if name in columns] if vectors is not None else []
     ways = {f"{name}_{REGULAR}" if name in singular_fallback else name: (name, tape) for name, tape in tapes.items()
             if name not in vectored}
@@ -121,7 +121,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
         _either(name, titles[name], written[f"{name}_{REGULAR}"], written[f"{name}_{SINGULAR_FALLBACK}"])
         if name in singular_fallback else written[name] for name in tapes)
     common = {f.name: f for function in written.values() for f in function.calls}
-    prologue = _prologue(Writer(dialect, whole, places, {}, codes, late), constants, rolls, functions)
+    prologue = _prologue(Writer(dialect, whole, leaves, {}, codes, late), constants, rolls, functions)
     return Program(functions, prologue, len(constants), tuple(codes), *_intrinsics(whole), tuple(common.values()))
 
 
@@ -159,7 +159,7 @@ def _prologue(writer: Writer, constants: Mapping[Node, int], rolls: Rolls, funct
     repeats = 1 if rolled else rolls("prologue", len(tape.prologue))
     if repeats is not None:
         one_by_one = replace(writer.dialect, sincos=None)
-        made = Rolled(one_by_one, tape, writer.places, {}, writer.codes, checks_of(tape, tape.prologue), tape.prologue,
+        made = Rolled(one_by_one, tape, writer.leaves, {}, writer.codes, checks_of(tape, tape.prologue), tape.prologue,
                       tuple(constants))
         if made.saved >= repeats:
             return made.function("prologue", PROLOGUE, (len(constants),), 0)
@@ -207,7 +207,7 @@ def _intrinsics(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunct
 
 def _columns(columns: Columns, name: str, title: str, drafts: Drafts, vectors: Drafts) -> Function:
     """A Jacobian as a function of what all columns share, and functions of directions, on vectors."""
-    tape, places, hoisted = columns.tape, drafts.places, drafts.hoisted
+    tape, leaves, hoisted = columns.tape, drafts.leaves, drafts.hoisted
     moving = [node for node in tape.steps if node.mask & SEED]
     shared = dict.fromkeys(core for node in moving for core in cores_of(node.args)
                            if not core.mask & SEED and core.mask and core.op != "leaf" and core not in hoisted)
@@ -219,14 +219,14 @@ def _columns(columns: Columns, name: str, title: str, drafts: Drafts, vectors: D
     for k, group in enumerate(columns.groups):
         entries = columns.entries(k)
         part = Tape(tape.recorder, {"along": Output("along", (len(entries),), entries)})
-        function = replace(vectors, hoisted=stored, places={**places, **seeds_of(group)}).function(
+        function = replace(vectors, hoisted=stored, leaves={**leaves, **seeds_of(group)}).function(
             part, f"{name}_along_{group.name}", title, [n for n in reachable(entries) if n.mask & SEED])
         along.append(Along(group.first, len(group.seeds), function, not function.parts and function.count <= INLINE))
     groups = {g for f in (values, *[a.function for a in along]) for g in f.arguments}
     operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
     motion = None
     if isinstance(columns, MotionColumns):
-        n_z, n_p = (sum(group == wanted for group, _ in places.values()) for wanted in ("z", "p"))
+        n_z, n_p = (sum(group == wanted for group, _ in leaves.values()) for wanted in ("z", "p"))
         motion = Motion(columns.n_rows, columns.n, len(shared), n_z - columns.n * columns.n_rows, columns.held,
                         n_p - columns.n * columns.held, tuple(-1 if k is None else k for k in columns.by))
         groups |= {"z", *["p"] * bool(columns.held)}

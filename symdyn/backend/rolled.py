@@ -2,7 +2,7 @@
 
 The steps are taken in the order in which they are recorded, and results are stored right after they are computed; so every
 value is computed as in straight-line code, by the same operations from the same values. What a step of a loop reads is found by
-comparing all trips: the same value in all, a value of the same trip, one of the trip before, or an entry of an array, at a place
+comparing all trips: the same value in all, a value of the same trip, one of the trip before, or an entry of an array, at an index
 that grows by the same number from trip to trip or, where it does not, stands in a table.
 """
 
@@ -81,9 +81,9 @@ class _Kept(Mapping[Node, tuple[str, int]]):
         if node in rolled.stored:
             return rolled.stored[node]
         k = rolled.number(node)
-        if k < 0 or rolled.groups[k] not in _ARRAYS or rolled.place[k] < 0 or self.first <= k < len(rolled.steps):
+        if k < 0 or rolled.groups[k] not in _ARRAYS or rolled.index[k] < 0 or self.first <= k < len(rolled.steps):
             raise KeyError(node)
-        return "w", int(rolled.place[k])
+        return "w", int(rolled.index[k])
 
     def __iter__(self) -> Iterator[Node]:
         raise NotImplementedError
@@ -97,7 +97,7 @@ class _Argument:
     """An argument of a step of a loop.
 
     kind     "same": one value in all trips; "own": step `step` of the same trip; "before": that of the trip before, in the first
-             trip `numbers[0]`; "array": at places of `group`; "table": numbers that differ
+             trip `numbers[0]`; "array": at indices of `group`; "table": numbers that differ
     numbers  of what is read in each trip, see Rolled.read
     """
 
@@ -110,19 +110,19 @@ class _Argument:
 class Rolled:
     """The steps of a function, and which of them are loops.
 
-    stored   nodes that are read from an array: what the prologue computed -> (group, place)
+    stored   nodes that are read from an array: what the prologue computed -> (group, index)
     checks   of the whole function
     inlined  what is written where it is used; None: what is used once and short
-    at       of each step its place among those of the tape; -1: it stores or takes sines
+    at       of each step its index among those of the tape; -1: it stores or takes sines
     read     what steps read: the steps, then all else
-    groups   of each of these; place: where it stands in the array of its group, -1: nowhere
+    groups   of each of these; index: in the array of its group, -1: in none
     """
 
-    def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
+    def __init__(self, dialect: Dialect, tape: Tape, leaves: Mapping[str, tuple[str, int]],
                  stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int | str], checks: Mapping[Node, str],
                  body: Sequence[Node], entries: Sequence[Any], inlined: frozenset[Node] | None = None) -> None:
         assert dialect.loops is not None and dialect.parts is not None
-        self.dialect, self.tape, self.places, self.stored = dialect, tape, places, stored
+        self.dialect, self.tape, self.leaves, self.stored = dialect, tape, leaves, stored
         self.codes, self.checks = codes, checks
         self.body, self.entries, self.inlined = body, entries, inlined
         self.arrays = tape.arrays
@@ -136,12 +136,12 @@ class Rolled:
         self._numbers[-1] = -1
         self.read: list[Any] = list(self.steps)
         self.groups: list[str] = [_STEP] * len(self.steps)
-        self.place = np.full(len(self.steps), -1)
+        self.index = np.full(len(self.steps), -1)
         kinds = self._look()
         sections = [step.section for step in self.steps]
         begins = [k + 1 for k, (one, other) in enumerate(pairwise(sections)) if one != other]
         self.loops = find_loops(kinds, begins)
-        self.size = self._find_places()
+        self.size = self._find_indices()
 
     @property
     def written(self) -> int:
@@ -152,16 +152,16 @@ class Rolled:
     def saved(self) -> int:
         """Statements that loops save, less what their tables take."""
         tables = {a.numbers.tobytes(): len(a.numbers) for a in self.arguments.values() if a.kind == "table" or
-                  (a.kind == "array" and len(set(np.diff(self.place[a.numbers]).tolist())) > 1)}
+                  (a.kind == "array" and len(set(np.diff(self.index[a.numbers]).tolist())) > 1)}
         return sum(loop.saved for loop in self.loops) - sum(tables.values()) // _ENTRIES
 
     def number(self, node: Node) -> int:
-        """The place of a node in what steps read; -1: none reads it."""
+        """The index of a node in what steps read; -1: none reads it."""
         return int(self._numbers[self.arrays.index(node)])
 
     def _in_order(self) -> tuple[list[_Step], np.ndarray]:
         """The steps: what sines and cosines need, these, then the rest; each result is stored as soon as it is there. And their
-        places among those of the tape."""
+        indices among those of the tape."""
         arrays = self.arrays
         body = arrays.indices(self.body)
         computed = np.zeros(len(arrays.steps), dtype=bool)
@@ -173,14 +173,14 @@ class Rolled:
         first: list[int] = []
         for k, entry in enumerate(self.entries):
             core = unsigned(entry)
-            place = arrays.index(core) if isinstance(core, Node) else -1
+            index = arrays.index(core) if isinstance(core, Node) else -1
             others.append(_Store("store", k, entry))
-            (behind.setdefault(place, []) if place >= 0 and computed[place] else first).append(-len(others))
+            (behind.setdefault(index, []) if index >= 0 and computed[index] else first).append(-len(others))
 
-        def stored(places: np.ndarray) -> np.ndarray:
-            steps = np.flatnonzero(np.isin(places, list(behind)))
-            stores = [behind[place] for place in places[steps].tolist()]
-            return np.insert(places, np.repeat(steps + 1, [len(s) for s in stores]), [k for s in stores for k in s])
+        def stored(indices: np.ndarray) -> np.ndarray:
+            steps = np.flatnonzero(np.isin(indices, list(behind)))
+            stores = [behind[index] for index in indices[steps].tolist()]
+            return np.insert(indices, np.repeat(steps + 1, [len(s) for s in stores]), [k for s in stores for k in s])
 
         order = products_next_to_their_sums(arrays, body, self.entries)
         order = order[computed[order]]
@@ -226,7 +226,7 @@ class Rolled:
                 self.read.append(value)
                 self.groups.append(_NUMBER)
             read[k] = constants[key]
-        self.place = np.concatenate([self.place, np.full(len(constants), -1)])
+        self.index = np.concatenate([self.index, np.full(len(constants), -1)])
 
         together = ~alone[reader]
         where = reader[together], column[together]
@@ -253,14 +253,14 @@ class Rolled:
         self.read += [self.arrays.steps[k] for k in outside]
         groups = [self._group(self.arrays.steps[k], sines) for k in outside]
         self.groups += [group for group, _ in groups]
-        self.place = np.concatenate([self.place, np.array([place for _, place in groups], dtype=np.int64)])
+        self.index = np.concatenate([self.index, np.array([index for _, index in groups], dtype=np.int64)])
         return self._numbers[cores]
 
     def _group(self, core: Any, sines: Mapping[Node, int]) -> tuple[str, int]:
-        """The array that a value is read from, if it is not a step, and its place there."""
+        """The array that a value is read from, if it is not a step, and its index there."""
         if isinstance(core, Node):
             if core.op == "leaf":
-                return self.places[core.args[1]]
+                return self.leaves[core.args[1]]
             if core in self.stored:
                 return self.stored[core]
             if core in sines:
@@ -284,15 +284,15 @@ class Rolled:
                 return _Argument("before", group, numbers, int(own[1]) + loop.length)
         return _Argument("array", group, numbers)
 
-    # -- places of what is kept
+    # -- indices of what is kept
 
     def _arguments(self) -> dict[tuple[int, int, int], _Argument]:
         """(loop, step, argument) -> what it is."""
         return {(k, r, j): self._argument(loop, r, j) for k, loop in enumerate(self.loops) for r in range(loop.length)
                 for j in range(len(self.steps[loop.begin + r].args))}
 
-    def _find_places(self) -> int:
-        """Places in w for what is read in another stretch or by an array; returns the size of w."""
+    def _find_indices(self) -> int:
+        """Indices in w for what is read in another stretch or by an array; returns the size of w."""
         self.arguments = self._arguments()
         self.apart = list(self._apart())
         needed = np.zeros(len(self.read), dtype=bool)
@@ -314,32 +314,32 @@ class Rolled:
             last = np.flatnonzero(read[-1] & ~read[:-1].any(axis=0))
             records = size + len(fields) * np.arange(loop.trips + 2 * _SPARE)
             for f, r in enumerate(fields):
-                self.place[loop.begin + r:loop.end:loop.length] = records[_SPARE:-_SPARE] + f
+                self.index[loop.begin + r:loop.end:loop.length] = records[_SPARE:-_SPARE] + f
                 spare.update(int(k) + f for k in (*records[:_SPARE], *records[-_SPARE:]))
             size += len(fields) * (loop.trips + 2 * _SPARE)
             # What is read after the last trip only is overwritten by each.
             for r in last:
-                self.place[loop.begin + r:loop.end:loop.length] = size
+                self.index[loop.begin + r:loop.end:loop.length] = size
                 size += 1
         self._continue_arrays(needed, spare)
-        rest = np.flatnonzero(needed & (self.place[:len(self.steps)] < 0))
-        self.place[rest] = size + np.arange(len(rest))
+        rest = np.flatnonzero(needed & (self.index[:len(self.steps)] < 0))
+        self.index[rest] = size + np.arange(len(rest))
         return size + len(rest)
 
     def _continue_arrays(self, needed: np.ndarray, spare: set[int]) -> None:
-        """Give steps that are computed apart the places next to a loop's where another loop reads them in a row with these."""
+        """Give steps that are computed apart the indices next to a loop's where another loop reads them in a row with these."""
         for a in self.arguments.values():
             if a.kind != "array" or a.group != _STEP:
                 continue
-            places = self.place[a.numbers]
-            known = np.flatnonzero(places >= 0)
-            if len(known) < 2 or len(known) == len(places):
+            indices = self.index[a.numbers]
+            known = np.flatnonzero(indices >= 0)
+            if len(known) < 2 or len(known) == len(indices):
                 continue
-            stride, rest = divmod(int(places[known[-1]] - places[known[0]]), int(known[-1] - known[0]))
-            row = places[known[0]] + stride * (np.arange(len(places)) - known[0])
-            missing = np.flatnonzero(places < 0)
-            if rest == 0 and (row[known] == places[known]).all() and all(int(row[k]) in spare for k in missing):
-                self.place[a.numbers[missing]] = row[missing]
+            stride, rest = divmod(int(indices[known[-1]] - indices[known[0]]), int(known[-1] - known[0]))
+            row = indices[known[0]] + stride * (np.arange(len(indices)) - known[0])
+            missing = np.flatnonzero(indices < 0)
+            if rest == 0 and (row[known] == indices[known]).all() and all(int(row[k]) in spare for k in missing):
+                self.index[a.numbers[missing]] = row[missing]
                 spare.difference_update(int(row[k]) for k in missing)
 
 
@@ -377,14 +377,14 @@ class Rolled:
             n = len(self.angles)
             take = self.dialect.loops.sines.format(n=n, sines=n, cosines=2 * n)
             return Part((), (), (Section(steps[0].section, (take,)),), (), False)
-        writer = Writer(replace(self.dialect, sincos=None), self.tape, self.places, _Kept(self, first), self.codes, set(),
+        writer = Writer(replace(self.dialect, sincos=None), self.tape, self.leaves, _Kept(self, first), self.codes, set(),
                         self.inlined)
         nodes = [step for step in steps if isinstance(step, Node)]
         stores = [step for step in steps if isinstance(step, _Store)]
-        kept = [node for node in nodes if self.place[self.number(node)] >= 0]
+        kept = [node for node in nodes if self.index[self.number(node)] >= 0]
 
         def results() -> tuple[str, ...]:
-            lines = [self.stored_at("w", str(self.place[self.number(node)]), writer.printer.text(node)) for node in kept]
+            lines = [self.stored_at("w", str(self.index[self.number(node)]), writer.printer.text(node)) for node in kept]
             return (*lines, *(self.stored_at(s.op, str(s.k), writer.printer.text(s.value)) for s in stores))
 
         part = writer.part(nodes, [*kept, *(s.value for s in stores)], results, self.checks)
@@ -393,10 +393,10 @@ class Rolled:
         inlined |= writer.printer.inline & uses
         return replace(part, stores=any(s.op == "store" for s in stores))
 
-    def stored_at(self, what: str, place: str, text: str) -> str:
-        """The statement that keeps a value at a place."""
+    def stored_at(self, what: str, index: str, text: str) -> str:
+        """The statement that keeps a value at an index."""
         assert self.dialect.parts is not None
-        return (self.dialect.store if what == "store" else self.dialect.parts.store).format(k=place, value=text)
+        return (self.dialect.store if what == "store" else self.dialect.parts.store).format(k=index, value=text)
 
 
 class _LoopWriter:
@@ -406,7 +406,7 @@ class _LoopWriter:
         assert rolled.dialect.loops is not None
         self.rolled, self.k, self.loop, self.words = rolled, k, rolled.loops[k], rolled.dialect.loops
         self.names = rolled.tape.recorder.names
-        self.writer = Writer(replace(rolled.dialect, sincos=None), rolled.tape, rolled.places, {}, {}, set())
+        self.writer = Writer(replace(rolled.dialect, sincos=None), rolled.tape, rolled.leaves, {}, {}, set())
         self.writer.taken.add(self.words.index)
         self.writer.names = {}
         self.recorder = Recorder()
@@ -415,7 +415,7 @@ class _LoopWriter:
         self.after: list[str] = []
         self.n_tables = 0
         # Steps that the loop reads from an array: those of its own trips must stand there by then.
-        self.read_by_place = {int(number) for (of, *_), a in rolled.arguments.items() if of == k and a.kind == "array"
+        self.read_by_index = {int(number) for (of, *_), a in rolled.arguments.items() if of == k and a.kind == "array"
                               for number in a.numbers}
         self.outside: dict[tuple[Any, ...], Any] = {}
         self.loads: dict[Node, str] = {}
@@ -425,7 +425,7 @@ class _LoopWriter:
         rolled, loop, writer = self.rolled, self.loop, self.writer
         steps = rolled.steps[loop.begin:loop.begin + loop.length]
         values = [self._repeated(r, step) for r, step in enumerate(steps)]
-        kept = [r for r, step in enumerate(steps) if isinstance(step, Node) and rolled.place[loop.begin + r] >= 0]
+        kept = [r for r, step in enumerate(steps) if isinstance(step, Node) and rolled.index[loop.begin + r] >= 0]
         used = Counter(core for args in values for core in cores_of(args))
         within = {core for args, step in zip(values, steps, strict=True) if isinstance(step, Node) for core in cores_of(args)}
         carried = {key[1]: leaf for key, leaf in self.outside.items() if key[0] == "before"}
@@ -466,13 +466,13 @@ class _LoopWriter:
         """The statements of a step that computes something; what is read after the loop only is kept after it."""
         rolled, loop, node = self.rolled, self.loop, self.nodes[r]
         lines = self.writer.step(node)
-        places = rolled.place[loop.begin + r:loop.end:loop.length]
-        if places[0] < 0:
+        indices = rolled.index[loop.begin + r:loop.end:loop.length]
+        if indices[0] < 0:
             return lines
-        line = rolled.stored_at("w", self._index(places), self.writer.printer.text(node))
-        if carried and places[0] == places[1] and loop.end - loop.length + r not in self.read_by_place:
+        line = rolled.stored_at("w", self._index(indices), self.writer.printer.text(node))
+        if carried and indices[0] == indices[1] and loop.end - loop.length + r not in self.read_by_index:
             before = next(leaf for key, leaf in self.outside.items() if key[:2] == ("before", r))
-            self.after.append(rolled.stored_at("w", str(places[0]), self.writer.text[before]))
+            self.after.append(rolled.stored_at("w", str(indices[0]), self.writer.text[before]))
             return lines
         return [*lines, line]
 
@@ -528,7 +528,7 @@ class _LoopWriter:
         else:
             numbers = argument.numbers[:1] if argument.kind in ("same", "before") else argument.numbers
             load = rolled.dialect.load.get(array, rolled.dialect.parts.load if rolled.dialect.parts is not None else "")
-            value = load.format(k=self._index(rolled.place[numbers]))
+            value = load.format(k=self._index(rolled.index[numbers]))
             if array != "w":
                 writer.groups.add(array)
         if carried:
@@ -560,7 +560,7 @@ class _LoopWriter:
         return self.names.get(core, of)
 
     def _index(self, numbers: np.ndarray) -> str:
-        """The place in an array, trip after trip: as it grows, or from a table."""
+        """The index in an array, trip after trip: as it grows, or from a table."""
         begin, i = int(numbers[0]) + self.rolled.dialect.first, self.words.index
         stride = int(numbers[1] - numbers[0]) if len(numbers) > 1 else 0
         if not (np.diff(numbers) == stride).all():

@@ -55,7 +55,7 @@ class Series(Gathered):
         return self.program.functions[1]
 
 
-def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> Series:
+def gather_series(content: Content, program: Program, dialect: Dialect, leaves: Mapping[str, tuple[str, int]]) -> Series:
     """The functions of the series of a right-hand side.
 
     Raises UnsupportedExpression where the right-hand side has no Taylor series.
@@ -75,10 +75,10 @@ def gather_series(content: Content, program: Program, dialect: Dialect, places: 
     factors = Output("series_next", (len(entries),), entries)
     whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": factors}))
     tapes = {name: whole.prune((name,)) for name in ("series_start", "series_next")}
-    written = build(dialect, tapes, {name: name for name in tapes}, {**places, **made.places}, program.reasons)
+    written = build(dialect, tapes, {name: name for name in tapes}, {**leaves, **made.leaves}, program.reasons)
     stretches = [part for f in written.functions for part in f.stretches]
     n_sums = made.n_s + len(zeros)
-    # An odd number of cache lines, so that rows do not compete for the same places of the cache.
+    # An odd number of cache lines, so that rows do not compete for the same sets of the cache.
     row = 2 * n_sums + made.n_x if n_lanes == 1 else (2 * n_sums + made.n_x + 7) // 16 * 16 + 8
     return Series(program=written, n_0=made.n_0, n_sums=n_sums, n_block=n_block, n_lanes=n_lanes, row=row, unrolled=n_lanes == 1,
                   sincos="symdyn_sincos(" in repr(stretches))

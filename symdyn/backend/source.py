@@ -163,16 +163,16 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
                           "dialect.toml with [loops]")
     environment = template_environment(*folders) if templates is not None else _shipped(*folders)
     content = with_violation(content)
-    places = {"t": ("t", 0)}
+    leaves = {"t": ("t", 0)}
     for group, names in content.groups.items():
-        places.update({name: (group, k) for k, name in enumerate(names)})
+        leaves.update({name: (group, k) for k, name in enumerate(names)})
     vectors = read_dialect(folder / "columns") if content.jacobians else None
-    program = build(dialect, content.tapes, content.titles, places, singular_fallback=content.singular_fallback,
+    program = build(dialect, content.tapes, content.titles, leaves, singular_fallback=content.singular_fallback,
                     columns=content.jacobians, vectors=vectors, rolled=not threads and rolled)
     lanes, many = None, None
     if backend == "c":
         shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
-        on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, places,
+        on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, leaves,
                                        content.singular_fallback, content.jacobians)
         lanes = on_vectors() if batch and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
@@ -181,7 +181,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         _check_single(content.name, program)
     record = method_of(method)
     asks = integrator and backend == "c" and record.gather is not None
-    gathered = record.gather(content, program, dialect, places) if asks and record.gather is not None else Gathered()
+    gathered = record.gather(content, program, dialect, leaves) if asks and record.gather is not None else Gathered()
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     divides = backend == "c" and integrator and not standalone and lanes is None and not threads and record.template != "taylor"
     context = _context(content, program, dialect, Options(standalone, threads, divides), _reader(environment), record, gathered,

@@ -29,12 +29,12 @@ _MANY_ZEROS = 100
 class Writer:
     """Writes one function or part of one: decides which nodes get a variable, and in which words.
 
-    stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, place)
+    stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, index)
     late     see _late
     inlined  what is written where it is used; None: what is used once and short
     """
 
-    def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
+    def __init__(self, dialect: Dialect, tape: Tape, leaves: Mapping[str, tuple[str, int]],
                  stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int | str], late: set[Node],
                  inlined: frozenset[Node] | None = None) -> None:
         self.dialect = dialect
@@ -42,7 +42,7 @@ class Writer:
         self.late = late
         self.demanded = {unsigned(n.args[1]) for n in late if n.op == "div"}
         self.tape = tape
-        self.places = places
+        self.leaves = leaves
         self.stored = stored
         self.codes = codes
         self.names = tape.recorder.names
@@ -114,27 +114,27 @@ class Writer:
                              if core not in self.text and (core.op == "leaf" or core in self.stored))
         lines: list[str] = []
         for leaf in sorted((n for n in used if n.op == "leaf"),
-                           key=lambda n: (list(GROUPS).index(n.mask), self.places[n.args[1]][1])):
+                           key=lambda n: (list(GROUPS).index(n.mask), self.leaves[n.args[1]][1])):
             self._load(leaf, lines)
         for node in sorted((n for n in used if n in self.stored), key=lambda n: self.stored[n]):
-            group, place = self.stored[node]
+            group, index = self.stored[node]
             self.groups.add(group)
-            unnamed = f"k{place + 1}" if group == "c" else f"{group}{place + 1}"
+            unnamed = f"k{index + 1}" if group == "c" else f"{group}{index + 1}"
             self.text[node] = identifier(self.names.get(node, unnamed), self.taken)
             handed_on = "" if self.dialect.parts is None else self.dialect.parts.load
             load = self.dialect.load.get(group, handed_on)
-            lines.append(self._assignment(node, load.format(k=place + self.dialect.first)))
+            lines.append(self._assignment(node, load.format(k=index + self.dialect.first)))
             if node in self.demanded and node in self.checks:
                 lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
         return lines
 
     def _load(self, leaf: Node, lines: list[str]) -> None:
-        group, place = self.places[leaf.args[1]]
+        group, index = self.leaves[leaf.args[1]]
         self.groups.add(group)
         if group == "t":
             self.text[leaf] = "t"
             return
-        value = self.dialect.load[group].format(k=place + self.dialect.first)
+        value = self.dialect.load[group].format(k=index + self.dialect.first)
         self._assign(leaf, leaf.args[1], value, lines)
 
     def _assign(self, node: Node, name: str, value: str, lines: list[str]) -> None:

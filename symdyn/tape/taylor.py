@@ -35,13 +35,13 @@ class Series:
     start    tape with the output `series_start`: x' (n_x,), then what the next orders need of order 0 (n_0,)
     next     tape with the output `series_next`, of one order: x' (n_x,), then the left factors of the sums (n_s,), then the right
              ones (n_s,)
-    places   leaves of `next` -> (group, place): t the order k; inputs 1/k and the coefficient of the time; q the coefficients of
+    leaves   of `next` -> (group, index): t the order k; inputs 1/k and the coefficient of the time; q the coefficients of
              x; ud k times these; u the sums; z what `start` gives behind x'
     """
 
     start: Tape
     next: Tape
-    places: dict[str, tuple[str, int]]
+    leaves: dict[str, tuple[str, int]]
     n_x: int
     n_0: int
     n_s: int
@@ -72,7 +72,7 @@ def not_smooth(entries: Sequence[Any]) -> str:
 class _Recurrences:
     def __init__(self, recorder: Recorder, state: Sequence[str]) -> None:
         self.r = recorder
-        self.places: dict[str, tuple[str, int]] = {}
+        self.leaves: dict[str, tuple[str, int]] = {}
         self.k = self._leaf("t", TIME, 0)
         self.inverse, self.time = (self._leaf("inputs", INPUT, j) for j in range(2))
         self.state = {name: (self._leaf("q", COORDINATE, j), self._leaf("ud", ACCELERATION, j)) for j, name in enumerate(state)}
@@ -94,15 +94,15 @@ class _Recurrences:
         entries = [*rates, *(a for a, _ in factors.values()), *(b for _, b in factors.values())]
         used = set(reachable(entries))
         kept = {node: leaf for node, leaf in self.kept.items() if leaf in used}
-        for group, leaves in (("u", factors), ("z", kept.values())):
-            self.places |= {leaf.args[1]: (group, index) for index, leaf in enumerate(leaves)}
+        for group, nodes in (("u", factors), ("z", kept.values())):
+            self.leaves |= {leaf.args[1]: (group, index) for index, leaf in enumerate(nodes)}
         start = Tape.of(self.r, series_start=np.array([*field, *kept], dtype=object))
         following = Tape.of(self.r, series_next=np.array(entries, dtype=object))
-        return Series(start, following, self.places, len(rates), len(kept), len(factors))
+        return Series(start, following, self.leaves, len(rates), len(kept), len(factors))
 
     def _leaf(self, group: str, mask: int, index: int) -> Node:
         name = f"series {group}{index + 1}"  # no name that a user can give
-        self.places[name] = (group, index)
+        self.leaves[name] = (group, index)
         return self.r.leaf(name, mask)
 
     # -- what the rules are made of

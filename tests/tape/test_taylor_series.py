@@ -28,7 +28,7 @@ def coefficients(made: Series, state: list[str], at: Mapping[str, Any], order: i
         for k in range(1, order):
             sums = [sum((left[j][s] * right[k - j][s] for j in range(1, k)), mpmath.mpf(0)) for s in range(made.n_s)]
             groups = {"t": [k], "inputs": [mpmath.mpf(1) / k, int(k == 1)], "q": x[k], "ud": k * x[k], "u": sums, "z": first[n:]}
-            values = {name: groups[g][place] for name, (g, place) in made.places.items() if place < len(groups[g])}
+            values = {name: groups[g][index] for name, (g, index) in made.leaves.items() if index < len(groups[g])}
             got = evaluate(made.next, {**values, **at}, DIGITS)["series_next"]
             rates, a, b = (got[i:j] for i, j in zip(made.borders, made.borders[1:]))
             left.append(a)

@@ -63,7 +63,7 @@ class Method:
     template   c/methods/TEMPLATE.c.jinja, with its coefficients; source: where the method is from
     needs      functions of the module besides rhs that are generated with it, of the right-hand side that is integrated
     own_step   it proposes the length of its steps itself
-    gather     what its template gets of its own, from the content, the program, the dialect and the places of leaves that
+    gather     what its template gets of its own, from the content, the program, the dialect and the indices of leaves that
                `render` has
     gives_slope   without a tableau: a step leaves the derivative at its end
     crosses    it can tell the error of a step after projection, and so step across positions where constraints lose rank
