@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.backend.packed import Places
+from symdyn.backend.packed import Pattern
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source
 from symdyn.emission import emit, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
-from symdyn.functions.packed import places
+from symdyn.functions.packed import pattern as pattern_of
 from symdyn.functions.table import BATCH
 from symdyn.functions.tapes import all_columns_of
 from symdyn.runtime.building.library import Library
@@ -34,15 +34,15 @@ class Libraries:
 
     again       derives the equations; None: only those that were made can be had elsewhere
     rolled      whether statements that are repeated become loops, as for `emit`
-    equations   None where they were not needed so far; texts: what was generated already; places: as below, where they are known
+    equations   None where they were not needed so far; texts: what was generated already; pattern: as below, where it is known
     """
 
     def __init__(self, again: Callable[[], Equations] | None, backend: str, templates: str | os.PathLike | None,
                  specialize: Mapping[Any, float] | None, fallback: str, equations: Equations | None = None,
-                 texts: Texts | None = None, rolled: Rolling = "auto", places: Places | None = None) -> None:
+                 texts: Texts | None = None, rolled: Rolling = "auto", pattern: Pattern | None = None) -> None:
         self.rolled = rolled
-        if places is not None:
-            self.places = places
+        if pattern is not None:
+            self.pattern = pattern
         self.again, self.backend, self.templates, self.specialize, self.fallback = again, backend, templates, specialize, fallback
         self._equations = equations
         self.texts = texts or Texts(backend)
@@ -58,7 +58,7 @@ class Libraries:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback, None, self.texts,
-                           self.rolled, self.__dict__.get("places"))
+                           self.rolled, self.__dict__.get("pattern"))
 
     @cached_property
     def rhs(self) -> Source:
@@ -89,9 +89,9 @@ class Libraries:
         return None if columns is None else columns.structure().reshape(*columns.shape, columns.n)
 
     @cached_property
-    def places(self) -> Places | None:
+    def pattern(self) -> Pattern | None:
         """Where the derivative of x_dot by x may differ from zero; None where that is unknown."""
-        return None if self._equations is None and self.again is None else places(self.equations)
+        return None if self._equations is None and self.again is None else pattern_of(self.equations)
 
     @cached_property
     def breaks(self) -> Tape | None:

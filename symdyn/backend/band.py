@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from symdyn.backend.packed import Places
+    from symdyn.backend.packed import Pattern
 
 # Solutions for every factorization in a step of "radau5"; multiplications that take as long as what is done once for each row;
 # the part of the dense factors' work that those in the band may take.
@@ -67,15 +67,15 @@ class Band:
         return 0 < self.work <= PART * self.dense_work
 
 
-def band_of(places: Places) -> Band:
-    """The band of mu - J with entries of J at these places."""
+def band_of(pattern: Pattern) -> Band:
+    """The band of mu - J with entries of J at these indices."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    n, rows, columns = places.n, places.rows, places.columns
+    n, rows, columns = pattern.n, pattern.rows, pattern.columns
     first = np.searchsorted(rows, np.arange(n + 1))
-    following = _following(places, first)
-    partners = _partners(places, first, set(following))
+    following = _following(pattern, first)
+    partners = _partners(pattern, first, set(following))
     eliminated = partners >= 0
     reduced = np.flatnonzero(eliminated)
     kept = np.setdiff1d(np.arange(n), [*reduced, *following])
@@ -96,26 +96,26 @@ def band_of(places: Places) -> Band:
                 int((-below).max(initial=0)))
 
 
-def _following(places: Places, first: np.ndarray) -> list[int]:
+def _following(pattern: Pattern, first: np.ndarray) -> list[int]:
     """States that nothing depends on but others that follow later, each after those that it depends on."""
-    users = np.bincount(places.columns, minlength=places.n)
+    users = np.bincount(pattern.columns, minlength=pattern.n)
     free, result = np.flatnonzero(users == 0).tolist(), []
     while free:
         i = free.pop()
         result.append(i)
-        for j in places.columns[first[i]:first[i + 1]].tolist():
+        for j in pattern.columns[first[i]:first[i + 1]].tolist():
             users[j] -= 1
             if users[j] == 0:
                 free.append(j)
     return result[::-1]
 
 
-def _partners(places: Places, first: np.ndarray, following: set[int]) -> np.ndarray:
+def _partners(pattern: Pattern, first: np.ndarray, following: set[int]) -> np.ndarray:
     """For each coordinate that can be eliminated the state that its rate is a multiple of, (n,); else -1. No such state is a
     coordinate that is eliminated itself."""
-    result, needed = np.full(places.n, -1), set()
-    for i in range(places.n_q):
-        entries = places.columns[first[i]:first[i + 1]]
+    result, needed = np.full(pattern.n, -1), set()
+    for i in range(pattern.n_q):
+        entries = pattern.columns[first[i]:first[i + 1]]
         if len(entries) == 1 and entries[0] != i and i not in following and i not in needed and result[entries[0]] < 0:
             result[i] = entries[0]
             needed.add(int(entries[0]))

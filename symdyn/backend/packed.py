@@ -1,4 +1,4 @@
-"""Where the derivative of x_dot by x may differ from zero; its entries are the function NAME, one after the other."""
+"""The sparsity pattern of the derivative of x_dot by x, whose entries are the function NAME, one after the other."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ LEAST_STATES, LARGEST_PART = 100, 0.1
 
 
 @dataclass(frozen=True)
-class Places:
-    """Places of rows and columns, (n_e,), row by row, of a matrix of n rows and n columns; n_q: how many states are
-    coordinates, which come first."""
+class Pattern:
+    """Indices of rows and columns, (n_e,), row by row, of the entries of a matrix of n rows and n columns that may differ from
+    zero; n_q: how many states are coordinates, which come first."""
 
     n: int
     rows: np.ndarray
@@ -29,10 +29,10 @@ class Places:
         """The order in which the matrices of compiled implicit methods have a narrow band."""
         return band_of(self)
 
-    def with_work(self) -> Places:
+    def with_work(self) -> Pattern:
         """With one more state at the end, the work of the loads, which depends on all others."""
         n = self.n
-        return Places(n + 1, np.r_[self.rows, np.full(n, n)], np.r_[self.columns, np.arange(n)], self.n_q)
+        return Pattern(n + 1, np.r_[self.rows, np.full(n, n)], np.r_[self.columns, np.arange(n)], self.n_q)
 
     @property
     def sparse(self) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.backend.metadata import ModuleMetadata
-from symdyn.backend.packed import LEAST_STATES, Places
+from symdyn.backend.packed import LEAST_STATES, Pattern
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SymdynError
 from symdyn.runtime.building.library import Library
@@ -46,13 +46,13 @@ class _Provider:
     """What gives a module its libraries, and where its derivative by x has entries."""
 
     library: Callable[[str | RightSide], Library]
-    given: Callable[[], Places | None]
+    given: Callable[[], Pattern | None]
 
     def __call__(self, what: str | RightSide) -> Library:
         return self.library(what)
 
     @property
-    def places(self) -> Places | None:
+    def pattern(self) -> Pattern | None:
         return self.given()
 
 
@@ -84,10 +84,10 @@ class PortableModule:
     def _packed(self) -> bytes:
         for name in self._functions:
             self.module.library(name)
-        record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain(), "places": self._places()}
+        record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain(), "pattern": self._pattern()}
         return zlib.compress(json.dumps(record).encode())
 
-    def _places(self) -> list[Any] | None:
+    def _pattern(self) -> list[Any] | None:
         """Of many states whose derivative has few entries."""
         if self.module.metadata.sizes.x < LEAST_STATES:
             return None
@@ -126,6 +126,6 @@ def _module(backend: str, packed: bytes) -> Module:
                           "advance. Name it in `functions`")
         return texts.load(what)
 
-    sent = record["places"]
-    there = None if sent is None else Places(sent[0], np.array(sent[1]), np.array(sent[2]), sent[3])
+    sent = record["pattern"]
+    there = None if sent is None else Pattern(sent[0], np.array(sent[1]), np.array(sent[2]), sent[3])
     return Module(metadata, _Provider(provide, lambda: there), backend)

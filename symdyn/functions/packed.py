@@ -9,17 +9,17 @@ import numpy as np
 
 from symdyn.backend.band import Band
 from symdyn.backend.methods import method_of
-from symdyn.backend.packed import NAME, Places
+from symdyn.backend.packed import NAME, Pattern
 from symdyn.formulation.equations import Equations
 from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape, reachable
 
 # What was found of equations that are still in use: whether there is the function, its text and its reader each take it.
-_found: WeakKeyDictionary[Equations, Places | None] = WeakKeyDictionary()
+_found: WeakKeyDictionary[Equations, Pattern | None] = WeakKeyDictionary()
 
 
-def places(equations: Equations) -> Places | None:
+def pattern(equations: Equations) -> Pattern | None:
     """Where x_dot depends on x, by the statements; None where a numeric algorithm solves for some of it, at some states."""
     if equations not in _found:
         _found[equations] = None if equations.singular_fallback is not None else _looked_for(equations)
@@ -30,17 +30,17 @@ def band(equations: Equations, method: str, baumgarte: bool = False, work: bool 
     """The order of elimination of an implicit method, where factors in it take less work than those of the whole matrix; None
     where they do not, or for other methods.
 
-    baumgarte, work   as in symdyn.backend.right_side.RightSide; Baumgarte's method changes the places
+    baumgarte, work   as in symdyn.backend.right_side.RightSide; Baumgarte's method changes the pattern
     """
     if baumgarte or "jacobian_x" not in method_of(method).needs:
         return None
-    there = places(equations)
+    there = pattern(equations)
     if there is None:
         return None
     return (there.with_work() if work else there).band if there.band.pays else None
 
 
-def _looked_for(equations: Equations) -> Places | None:
+def _looked_for(equations: Equations) -> Pattern | None:
     entries = equations.quantity("rhs").tolist()
     bits = {node: 1 << k for k, node in enumerate(_leaves(equations)) if node is not None}
     for node in reachable(entries):
@@ -53,12 +53,13 @@ def _looked_for(equations: Equations) -> Places | None:
     needs = [bits[e] if isinstance(e, Node) else 0 for e in entries]
     result = [[k for k, bit in enumerate(reversed(bin(need)[2:])) if bit == "1"] for need in needs]
     rows = np.repeat(np.arange(len(entries)), [len(row) for row in result])
-    return Places(len(entries), rows, np.array([k for row in result for k in row], dtype=int), len(equations.symbols.coordinates))
+    columns = np.array([k for row in result for k in row], dtype=int)
+    return Pattern(len(entries), rows, columns, len(equations.symbols.coordinates))
 
 
 def packed_tape(equations: Equations) -> Tape:
-    """The entries at these places, row by row; each row is differentiated by itself, since it needs few of the statements."""
-    there = places(equations)
+    """The entries of the pattern, row by row; each row is differentiated by itself, since it needs few of the statements."""
+    there = pattern(equations)
     assert there is not None
     leaves, recorder, entries = _leaves(equations), equations.recorder, equations.quantity("rhs").tolist()
     values: list[Any] = []

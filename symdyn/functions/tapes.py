@@ -31,7 +31,7 @@ from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_b
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
 from symdyn.functions import sensitivities as columns
-from symdyn.functions.packed import packed_tape, places
+from symdyn.functions.packed import packed_tape, pattern
 from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
 from symdyn.tape.balance import balance
 from symdyn.tape.jumps import Jump, jumps
@@ -55,7 +55,7 @@ def has_function(equations: Equations, name: str) -> bool:
     if name in (BOUNDS, RANGES):
         return bool(event_leaves(equations))
     if name == PACKED:
-        return places(equations) is not None
+        return pattern(equations) is not None
     if name in columns.COLUMNS:
         return name in columns.functions_of(equations)
     if name in columns.ADJOINTS:

@@ -147,8 +147,8 @@ def measure(n: int) -> list[Row]:
     begun = clock.process_time()
     module = elastic_cable(n).embedding().compile(backend="c")
     derive = clock.process_time() - begun
-    places = module.jacobian_indices()
-    assert places is not None
+    pattern = module.jacobian_indices()
+    assert pattern is not None
     exact = module.simulate([0, DURATION], rtol=TIGHT, atol=TIGHT / 100).q[-1]
     rows = []
     for method, tolerances in TOLERANCES.items():
@@ -158,8 +158,8 @@ def measure(n: int) -> list[Row]:
             begun = clock.thread_time()  # threads of a BLAS wait for each other, and would count
             sol = module.simulate([0, DURATION], method=method, rtol=rtol, atol=rtol / 100)
             seconds = (clock.thread_time() - begun) / DURATION
-            rows.append(Row(n, places.n, len(places.rows), derive, method, rtol, sol.n_steps, sol.njev, sol.nlu, memory, seconds,
-                            float(np.abs(sol.q[-1] - exact).max())))
+            rows.append(Row(n, pattern.n, len(pattern.rows), derive, method, rtol, sol.n_steps, sol.njev, sol.nlu, memory,
+                            seconds, float(np.abs(sol.q[-1] - exact).max())))
     return rows
 
 
@@ -203,14 +203,14 @@ def at_rest(module: Module) -> tuple[np.ndarray, csc_matrix]:
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
-    places, n = module.jacobian_indices(), module.metadata.sizes.q
-    assert places is not None
-    own = (places.rows >= n) & (places.columns < n)
+    pattern, n = module.jacobian_indices(), module.metadata.sizes.q
+    assert pattern is not None
+    own = (pattern.rows >= n) & (pattern.columns < n)
     q = np.array([module.metadata.initial.get(name, 0.0) for name in module.metadata.q])
     for k in range(NEWTON_STEPS):
         state = np.concatenate([q, np.zeros(n)])
         values = module.evaluate("jacobian_x_packed", 0.0, state)
-        slope = csc_matrix((values[own], (places.rows[own] - n, places.columns[own])), shape=(n, n))
+        slope = csc_matrix((values[own], (pattern.rows[own] - n, pattern.columns[own])), shape=(n, n))
         try:
             step = splu(slope).solve(-module.rhs(0.0, state)[n:])
         except RuntimeError:  # an exactly singular matrix

@@ -29,7 +29,7 @@ from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
-    from symdyn.backend.packed import Places
+    from symdyn.backend.packed import Pattern
     from symdyn.given import ContactMode, Key, Named, Names, Numbers, PathName, Row, States, Times, Values
     from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
@@ -562,14 +562,14 @@ class Module:
         result = self.structure(name)
         return result if result is not None else np.zeros(self.shape(name), dtype=bool)
 
-    def jacobian_indices(self) -> Places | None:
+    def jacobian_indices(self) -> Pattern | None:
         """Where `jacobian_x` may differ from zero, as indices of rows and columns; None where that is unknown, such as for a
         module without equations.
 
         >>> sd.systems.pendulum().compile(backend="numpy").jacobian_indices().columns
         array([1, 0])
         """
-        result: Places | None = getattr(self._provider, "places", None)
+        result: Pattern | None = getattr(self._provider, "pattern", None)
         return result
 
     def breaks(self) -> Tape | None:

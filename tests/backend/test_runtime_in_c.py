@@ -21,7 +21,7 @@ from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import METHODS
 from symdyn.backend.methods.gauss import OfGauss
 from symdyn.backend.methods.radau import FIVE_STAGES, THREE_STAGES
-from symdyn.backend.packed import Places
+from symdyn.backend.packed import Pattern
 from symdyn.backend.source import _shipped, template_folders
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
@@ -276,7 +276,7 @@ def row_of_masses(n: int) -> tuple[Shape, np.ndarray, Band]:
     pattern[n:2 * n, :n] = pattern[n:2 * n, n:2 * n] = near
     pattern[n:2 * n, 2 * n] = True
     pattern[2 * n, [1, 2 * n]] = pattern[2 * n + 1, 0] = True
-    band = Places(2 * n + 2, *np.nonzero(pattern), n).band
+    band = Pattern(2 * n + 2, *np.nonzero(pattern), n).band
     assert (band.reduced, band.size) == (n, n + 1)
     return shape, pattern, band
 

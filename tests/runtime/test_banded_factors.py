@@ -11,7 +11,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.backend.band import Band
-from symdyn.backend.packed import NAME, Places
+from symdyn.backend.packed import NAME, Pattern
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError
 from symdyn.lab.stiff_cables import elastic_cable
@@ -28,14 +28,14 @@ def dense(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Band, "pays", property(lambda self: False))
 
 
-def places(pattern: np.ndarray, n_q: int) -> Places:
-    return Places(len(pattern), *np.nonzero(pattern), n_q)
+def pattern_of(there: np.ndarray, n_q: int) -> Pattern:
+    return Pattern(len(there), *np.nonzero(there), n_q)
 
 
 # -- the order
 
 
-def solved(given: Places, J: np.ndarray, mu: complex, right: np.ndarray) -> np.ndarray:
+def solved(given: Pattern, J: np.ndarray, mu: complex, right: np.ndarray) -> np.ndarray:
     """(mu - J) x = right as the band says: coordinates eliminated, a matrix within the diagonals, the rest substituted."""
     band, order = given.band, given.band.sequence
     P, b, r, end = J[np.ix_(order, order)], right[order], band.reduced, band.reduced + band.size
@@ -64,7 +64,7 @@ def test_orders_solve_random_systems(seed: int) -> None:
     for i in range(n_q):
         pattern[i, rng.integers(n_q, n, 1 if rng.random() < 0.7 else 3)] = True
     pattern[:, rng.integers(n_q, n, 3)] = False
-    given = places(pattern, n_q)
+    given = pattern_of(pattern, n_q)
     J, right = np.where(pattern, rng.normal(size=(n, n)), 0.0), rng.normal(size=n)
     for mu in (3.0, 2.0 + 5.0j):
         np.testing.assert_allclose(solved(given, J, mu, right), np.linalg.solve(mu * np.eye(n) - J, right), rtol=0, atol=1e-9)

@@ -29,9 +29,9 @@ def cable() -> Any:
 
 def matrix(module: Any, x: np.ndarray) -> np.ndarray:
     """The derivative from its entries."""
-    places = module.jacobian_indices()
-    found = np.zeros((places.n, places.n))
-    found[places.rows, places.columns] = module.evaluate("jacobian_x_packed", 0.0, x)
+    pattern = module.jacobian_indices()
+    found = np.zeros((pattern.n, pattern.n))
+    found[pattern.rows, pattern.columns] = module.evaluate("jacobian_x_packed", 0.0, x)
     return found
 
 
@@ -162,7 +162,7 @@ def test_where_entries_stand_is_looked_for_once(monkeypatch: pytest.MonkeyPatch)
     matrix(module, np.array([0.1, 0.2, 0.3, 0.4]))
     assert len(looked) == 1
     another = sd.systems.get("double_pendulum").embedding()
-    assert packed.places(another) is packed.places(another) and len(looked) == 2
+    assert packed.pattern(another) is packed.pattern(another) and len(looked) == 2
 
 
 def test_ratios_and_growth_of_measurements() -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.backend.packed import NAME, Places
+from symdyn.backend.packed import NAME, Pattern
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.inputs.inputs import not_finite
@@ -118,7 +118,7 @@ class Field:
 class SparseJacobian:
     """The same as a matrix of SciPy's without the zeros, whose factors have few entries, too."""
 
-    def __init__(self, module: Module, request: Request, there: Places) -> None:
+    def __init__(self, module: Module, request: Request, there: Pattern) -> None:
         self.module, self.request, self.there = module, request, there
         self.evaluator = module.library(NAME).evaluator(NAME)
         self.evaluator.set_params(request.p)
