@@ -144,6 +144,39 @@ def test_public_docstrings_begin_sentences_with_their_subject() -> None:
     assert [(name, one) for name, text in texts.items() for one in sentences(" ".join(text.split())) if begins_late(one)] == []
 
 
+def late_in_module(path: Path) -> list[str]:
+    """Sentences of the docstrings and comments of a module that begin with a clause in place of a subject."""
+    text = path.read_text(encoding="utf-8")
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)]
+    blocks = [(node.body[0].lineno, docstring) for node in nodes if (docstring := ast.get_docstring(node))]
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = [(*token.start, token.string.lstrip("# ")) for token in tokens if token.type == tokenize.COMMENT]
+    for k, (line, column, comment) in enumerate(comments):
+        if k and comments[k - 1][:2] == (line - 1, column):
+            blocks[-1] = (blocks[-1][0], f"{blocks[-1][1]} {comment}")
+        else:
+            blocks.append((line, comment))
+    return [f"{path.name}:{line}: {one[:60]}" for line, block in sorted(blocks) for one in sentences(" ".join(block.split()))
+            if begins_late(one)]
+
+
+@pytest.mark.parametrize("package", ["backend", "tape", "targets"])
+def test_modules_begin_sentences_with_their_subject(package: str) -> None:
+    assert [line for path in sorted((ROOT / "symdyn" / package).rglob("*.py")) for line in late_in_module(path)] == []
+
+
+def test_the_readme_of_templates_begins_sentences_with_their_subject() -> None:
+    assert clumsy(ROOT / "templates" / "README.md") == []
+
+
+def test_a_late_subject_in_a_module_is_found(tmp_path: Path) -> None:
+    """In a docstring, and in a comment of several lines; not in a message, which is no sentence of its own."""
+    module = tmp_path / "module.py"
+    module.write_text('"""A mass. Of two the\nfirst is taken."""\n# It is\n# zero. What is left is\n# one.\nx = "What?"\n',
+                      encoding="utf-8")
+    assert late_in_module(module) == ["module.py:1: Of two the first is taken.", "module.py:3: What is left is one."]
+
+
 def test_a_clumsy_sentence_is_found(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     text = "# What it is\n\nA mass. What is left is\nzero. What is it?\n\n- Of two the first is taken.\n\nIt is is so.\n"

@@ -111,8 +111,8 @@ def _following(pattern: Pattern, first: np.ndarray) -> list[int]:
 
 
 def _partners(pattern: Pattern, first: np.ndarray, following: set[int]) -> np.ndarray:
-    """For each coordinate that can be eliminated the state that its rate is a multiple of, (n,); else -1. No such state is a
-    coordinate that is eliminated itself."""
+    """The state that the rate of each coordinate that can be eliminated is a multiple of, (n,); -1 for all others. No such state
+    is a coordinate that is eliminated itself."""
     result, needed = np.full(pattern.n, -1), set()
     for i in range(pattern.n_q):
         entries = pattern.columns[first[i]:first[i + 1]]

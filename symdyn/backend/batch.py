@@ -31,7 +31,7 @@ class LaneFunction:
 
 @dataclass(frozen=True)
 class Batch:
-    """What a template needs: functions on vectors, by name, and the operations that they use."""
+    """Functions on vectors, by name, and the operations that they use, for a template."""
 
     functions: Mapping[str, Function]
     operations: tuple[LaneFunction, ...]

@@ -1,7 +1,7 @@
 """Jacobians by directional derivatives, several columns at once: a direction in each SIMD lane.
 
 A column of a Jacobian is the derivative along one direction. Columns share all that does not depend on the direction: it is
-computed once, as numbers. What is left is linear in the direction and the same for every column, so it is written once, on
+computed once, as numbers. The rest is linear in the direction and the same for every column, so it is written once, on
 vectors: far fewer statements than all columns one by one, and as many columns a statement as the processor has lanes.
 
 Source: Griewank and Walther, Evaluating Derivatives, 2nd ed., section 3.1 (vector forward mode).
@@ -18,16 +18,17 @@ import numpy as np
 from symdyn.tape.node import SEED, Node
 from symdyn.tape.tape import Tape, count_of, reachable
 
-# What vectors of directions are combined by; what selects between them does not depend on the direction.
+# Operations that combine vectors of directions; conditions that select between them do not depend on the direction.
 LINEAR = frozenset({"leaf", "neg", "add", "sub", "mul", "div", "select"})
 # Lanes that the choice counts with: registers of 256 bits.
 LANES = 4
-# From how many steps of all columns one by one on, and how many times those of all together, it is faster: calls, and the numbers
-# that are kept for the directions, take time, too. Measured over the catalogue: 0.87 to 0.93 of the speed for what is below,
-# 1.15 to 1.66 times the speed for what is above.
+# The least number of steps of all columns one by one, and as a multiple of those of all together, that makes it faster: calls
+# and the numbers that are kept for the directions take time, too. Measured over the catalogue: 0.87 to 0.93 of the speed for
+# what is below, 1.15 to 1.66 times the speed for what is above.
 LEAST, GAIN = 800, 1.5
-# From how many steps of all columns of sensitivities on they are one piece of code in a loop: measured over n_link_pendulum(5),
-# puma560 and spatial_chain(7) by 1 to 60 numbers, 0.85 to 0.98 of the speed of a piece for each below, 0.95 to 1.37 above.
+# The least number of steps of all columns of sensitivities that makes them one piece of code in a loop: measured over
+# n_link_pendulum(5), puma560 and spatial_chain(7) by 1 to 60 numbers, 0.85 to 0.98 of the speed of a piece for each below, 0.95
+# to 1.37 above.
 LOOPED = 1800
 
 
@@ -59,7 +60,7 @@ class Columns:
 
     @property
     def result_shape(self) -> tuple[int, ...]:
-        """Of the function."""
+        """The shape of the function's result."""
         return (*self.shape, self.n)
 
     @property
@@ -98,7 +99,7 @@ class Columns:
                    for node, needed in self._needs(k).items())
 
     def structure(self) -> np.ndarray:
-        """Where the matrix may differ from zero, (n_rows, n) of bool."""
+        """Whether each entry of the matrix may differ from zero, (n_rows, n) of bool."""
         result = np.zeros((self.n_rows, self.n), dtype=bool)
         for k, group in enumerate(self.groups):
             needs = self._needs(k)
@@ -172,5 +173,5 @@ def _together(needs: Mapping[Node, int], node: Node) -> int:
 
 
 def seeds_of(group: Group) -> dict[str, tuple[str, int]]:
-    """Where the leaves of a direction are read: name -> (group of arguments, index)."""
+    """The leaves of a direction: name -> (group of arguments, index)."""
     return {name: ("change", k) for k, name in enumerate(group.seeds)}

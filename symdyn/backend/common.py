@@ -16,7 +16,7 @@ from symdyn.tape.node import Node
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a function begins with.
+    """The beginning of a function, which it has in common with others.
 
     calls   functions that it calls, in this order
     slots   what these compute and the function reads: node -> index in w; n_w: size of w
@@ -51,7 +51,7 @@ def most_in_common(bodies: Mapping[str, Sequence[Node]],
     counts = Counter(functions.values())
 
     def statements(held: int) -> int:
-        """How many are saved, where the functions are the bits of a number."""
+        """The number that is saved, where the functions are the bits of a number."""
         return (held.bit_count() - 1) * sum(n for other, n in counts.items() if other & held == held)
 
     best = max(counts, key=statements, default=0)

@@ -1,6 +1,6 @@
-"""What templates get: frozen records by subject, whose fields, properties and methods they read.
+"""Frozen records by subject, whose fields, properties and methods templates read.
 
-For authors of templates they are listed in templates/README.md, which tests/backend/test_templates.py compares with them.
+They are listed for authors of templates in templates/README.md, which tests/backend/test_templates.py compares with them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Model:
 
     @property
     def formulation(self) -> str:
-        """How the equations were derived."""
+        """The name of the derivation of the equations."""
         return self.metadata.formulation
 
     @property
@@ -139,7 +139,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Options:
-    """What kind of files are wanted.
+    """The kind of files that are wanted.
 
     standalone   true for files that are kept, false for a module that is only loaded
     threads      whether there is a kernel of many motions, or states, by a thread each (C)
@@ -152,7 +152,7 @@ class Options:
 
     @property
     def linked(self) -> str:
-        """How functions are declared that only this library calls (C)."""
+        """The declaration of functions that only this library calls (C)."""
         return "SYMDYN_HIDDEN" if self.divided else "SYMDYN_APART static" if self.threads else "static"
 
 
@@ -222,7 +222,7 @@ def call_of(f: Function) -> str:
 
 @dataclass(frozen=True)
 class Needs:
-    """What statements need besides the math library (C).
+    """Needs of statements besides the math library (C).
 
     sign             the sign function
     sincos           sines and cosines that are taken all at once
@@ -262,7 +262,7 @@ class Algorithms:
 
 @dataclass(frozen=True)
 class Corrections:
-    """How states are kept on constraints.
+    """The corrections that keep states on constraints.
 
     n_rows    rows of the constraints
     longest   length of the longest correction: residuals, then changes of coordinates or speeds
@@ -277,7 +277,7 @@ class Corrections:
 
 @dataclass(frozen=True)
 class Manifold:
-    """What holds for states.
+    """Conditions that states fulfil.
 
     unit_groups   indices in x of vectors of length 1, such as Euler parameters
     corrections   none, or for constraints `n_rows`, `longest`, `turning`, `angles`
@@ -335,22 +335,23 @@ class Integrator:
 
     @property
     def events(self) -> Sequence[EventRecord]:
-        """What it looks for: of each its name, direction, stop, reset, enclosed, unproved."""
+        """Events that it looks for, each with its name, direction, stop, reset, enclosed, unproved."""
         return self.shape.events
 
     @property
     def most_events(self) -> int:
-        """How many events may wait until they are taken."""
+        """Number of events that may wait until they are taken."""
         return self.shape.most_events
 
     @property
     def enclosed(self) -> list[bool]:
-        """Which events have bounds."""
+        """Whether each event has bounds."""
         return [event.enclosed for event in self.shape.events]
 
     @property
     def leaves(self) -> Sequence[int]:
-        """Of what the functions `event_bounds` and `event_ranges` take bounds: 0 for t, then x, then the inputs."""
+        """Indices of the quantities whose bounds the functions `event_bounds` and `event_ranges` take: 0 for t, then x, then the
+        inputs."""
         return self.shape.leaves
 
     @property

@@ -22,7 +22,7 @@ CALL = ("take", "item")
 
 @dataclass(frozen=True)
 class SinCos:
-    """How sines and cosines are taken all at once, of the angles that need no other sine or cosine.
+    """Sines and cosines that are taken all at once, of the angles that need no other sine or cosine.
 
     least      from how many sines and cosines on this is worth it; fewer are written one by one
     take       one statement a line, with {n} the number of angles and {angles} their values, separated by commas
@@ -37,7 +37,7 @@ class SinCos:
 
 @dataclass(frozen=True)
 class Parts:
-    """How a long function is divided.
+    """The division of a long function into parts.
 
     whole        functions of so many steps are not divided
     longest      steps of a part, at most
@@ -52,7 +52,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class Loops:
-    """How steps that a function repeats are written as a loop; what is handed on stands in the array that parts have.
+    """The words of a loop over steps that a function repeats; what is handed on stands in the array that parts have.
 
     index            the variable that counts trips, from 0
     begin, end       lines around the statements of a trip; {n}: the number of trips
@@ -75,7 +75,7 @@ class Loops:
 
 @dataclass(frozen=True)
 class Call:
-    """How a numeric algorithm of the tape is called; its text is the template {function}.*.jinja of the backend.
+    """The call of a numeric algorithm of the tape; its text is the template {function}.*.jinja of the backend.
 
     take   one statement a line, with {name} of its results, {function}, {sizes} each followed by a comma, {arguments} separated
            by commas, {n_in} and {n_out} the numbers of arguments and results, and {code} to return where it fails
@@ -106,7 +106,7 @@ class Caseless(set[str]):
 
 @dataclass(frozen=True)
 class Dialect:
-    """How one language writes numbers, operations and assignments.
+    """The words of one language for numbers, operations and assignments.
 
     operations   op -> format of its arguments {0}, {1}, ...; infix ones are built in where absent
     assign       format of an assignment to a new variable, with {name} and {value}

@@ -74,7 +74,7 @@ def products_next_to_their_sums(arrays: Arrays, body: np.ndarray, entries: Seque
     inside = np.zeros(len(arrays.steps), dtype=bool)
     inside[body] = True
     alone = inside & arrays.does("mul") & (arrays.read_by(inside) == 1) & ~arrays.marked(map(unsigned, entries))
-    # Behind each step there is room for the two products that may come before the next one.
+    # The numbers leave room behind each step for the two products that may come before the next one.
     order = 3 * np.arange(len(arrays.steps))
     reading = np.flatnonzero((inside & arrays.does(*_SUMS))[arrays.readers] & (arrays.cores >= 0))
     reading = reading[alone[arrays.cores[reading]]]

@@ -46,7 +46,7 @@ class Draft:
 
 @dataclass(frozen=True)
 class Drafts:
-    """How functions of one program are written.
+    """The writing of the functions of one program.
 
     leaves    name -> (group, index in it)
     hoisted   what the prologue computes, in the same way; codes: what is returned for each reason
@@ -148,7 +148,7 @@ class Drafts:
         return few_waiting(steps, entries, self.inlined.get(draft.name) or ()) if self.dialect.reordered else steps
 
     def beginnings(self, drafts: Sequence[Draft]) -> dict[str, Beginning]:
-        """What long functions without loops begin with: what they have in common with others, if that saves LEAST_COMMON."""
+        """The beginnings of long functions without loops: what they have in common with others, if that saves LEAST_COMMON."""
         found = {draft.name: Beginning() for draft in drafts if self.long(draft)}
         left = {draft.name: draft for draft in drafts if draft.name in found}
         while True:

@@ -1,4 +1,4 @@
-"""Which statements of tapes a state exercises: those whose value, changed a little, changes a result by more than its tolerance.
+"""The statements that a state exercises: those whose value, changed a little, changes a result by more than its tolerance.
 
 All states are looked at together, forward and back, in floats. A statement that no state exercises may be wrong without any
 reference vector showing it.
@@ -27,7 +27,7 @@ HALVINGS = 60
 
 
 class _Unguarded(Arrays):
-    """What stands behind a check counts also where the check fails; algorithms are given all points."""
+    """Statements behind a check count also where the check fails; algorithms are given all points."""
 
     def __init__(self, values: Mapping[str, np.ndarray], n: int) -> None:
         super().__init__(values)

@@ -116,7 +116,7 @@ class Function:
 
     @property
     def n_columns(self) -> int:
-        """Of a matrix, whose last axis these are."""
+        """Columns of a matrix, whose last axis these are."""
         return self.shape[-1]
 
     @property
@@ -191,5 +191,5 @@ class Motion:
 
     @property
     def by_first(self) -> int:
-        """Where what columns are by begins in the direction."""
+        """Index in the direction at which the numbers begin that columns are by."""
         return self.n_x + self.held

@@ -1,4 +1,4 @@
-"""What a method of integration gathers from a mechanism for its template."""
+"""The facts about a mechanism that a method of integration gathers for its template."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from symdyn.backend.band import Band
 
 @dataclass(frozen=True, kw_only=True)
 class Gathered:
-    """What the template of a method gets of its own, and what the parts of the runtime depend on of that.
+    """The record that the template of a method gets of its own, and that the parts of the runtime depend on.
 
     second_order   whether q_dot = u; None: the method does not ask
     unrolled       whether sums are written out one by one

@@ -1,4 +1,4 @@
-"""What the parts of the runtime in C are given of a mechanism: sizes, switches, and the functions they call."""
+"""Sizes, switches and functions of a mechanism for the parts of the runtime in C."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from symdyn.backend.methods import Method
 # The functions that a projection calls, besides those that a method needs.
 OF_PROJECTION = ("position_correction", "velocity_correction", "violation")
 OF_EVENTS = ("events", "event_resets", "reset_directions")
-# Of a run backwards: weights in the place of ud.
+# Functions of a run backwards, with weights in the place of ud.
 OF_ADJOINT = ("rhs_weights", "corrected_weights")
-# Of sensitivities: their part of a projection, the derivatives of events.
+# Functions of sensitivities: their part of a projection, the derivatives of events.
 OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
-# With what resets made of the speeds in the place of ud, behind the bounds that there are.
+# A function with the speeds after resets in the place of ud, behind the bounds that there are.
 OF_CARRYING = ("carried_columns",)
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
@@ -50,7 +50,7 @@ class Integrated:
 
 @dataclass(frozen=True)
 class Shape:
-    """What decides the text of an integrator besides its method.
+    """The facts that decide the text of an integrator besides its method.
 
     sizes      of the groups q, u, z, inputs
     n_rows     rows of the constraints, 0 without a projection
@@ -85,7 +85,7 @@ class Shape:
 
     @property
     def most_events(self) -> int:
-        """How many events may wait until they are taken."""
+        """Number of events that may wait until they are taken."""
         return _WAITING + 3 * len(self.events)
 
     @property

@@ -60,7 +60,7 @@ def find_loops(kinds: np.ndarray, begins: Sequence[int] | np.ndarray) -> list[Lo
 
 
 def _since(kinds: np.ndarray) -> np.ndarray:
-    """Of each step, after how many steps it comes again with the kinds of those behind it; 0: it comes for the first time."""
+    """The number of steps after which each comes again with the kinds of those behind it; 0: it comes for the first time."""
     n = max(0, len(kinds) - _IN_A_ROW + 1)
     keys = np.zeros(n, dtype=np.uint64)
     for k in range(_IN_A_ROW):

@@ -15,8 +15,8 @@ from symdyn.tape.node import Node
 
 
 def few_waiting(body: Sequence[Node], entries: Sequence[Any], inlined: Collection[Node]) -> list[Node]:
-    """The steps of `body`, each behind what it needs. Of the statements whose operands are there the next one is that after which
-    the fewest values wait; of several, the one that the longest chain of steps begins with.
+    """The steps of `body`, each behind what it needs. The next statement, among those whose operands are there, is that
+    after which the fewest values wait; of several, the one that the longest chain of steps begins with.
 
     entries   used after all of them
     inlined   steps that are written where they are used, which stand before the statement that they are written in

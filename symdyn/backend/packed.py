@@ -10,7 +10,7 @@ import numpy as np
 from symdyn.backend.band import Band, band_of
 
 NAME = "jacobian_x_packed"
-# From so many states on, and with this part of the entries at most, sparse factors take less time than dense ones.
+# Sparse factors take less time than dense ones from so many states on, and with this part of the entries at most.
 LEAST_STATES, LARGEST_PART = 100, 0.1
 
 
@@ -30,7 +30,7 @@ class Pattern:
         return band_of(self)
 
     def with_work(self) -> Pattern:
-        """With one more state at the end, the work of the loads, which depends on all others."""
+        """The pattern with one more state at the end, the work of the loads, which depends on all others."""
         n = self.n
         return Pattern(n + 1, np.r_[self.rows, np.full(n, n)], np.r_[self.columns, np.arange(n)], self.n_q)
 

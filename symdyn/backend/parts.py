@@ -33,7 +33,7 @@ class Parts:
             return ""
         self._included.add(name)
         lines: list[str] = []
-        # Of each open condition whether its lines are kept; None: it stays as it is written.
+        # Whether the lines of each open condition are kept; None: it stays as it is written.
         open_conditions: list[bool | None] = []
         for line in self._read(name).splitlines():
             condition = _CONDITION.match(line)

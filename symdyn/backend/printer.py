@@ -84,7 +84,7 @@ class Printer:
     def _fused(self, first: Any, second: Any, minus: bool) -> str:
         """a*b + c, a*b - c or c - a*b in one step, where a product is written nowhere else; else nothing.
 
-        Of two products the one recorded later is taken, which is likely to be known later.
+        The one recorded later of two products is taken, which is likely to be known later.
         """
         assert self.dialect.madd is not None
         for product, other, negated, subtracted in ((second, first, minus, False), (first, second, False, minus)):

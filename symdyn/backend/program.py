@@ -67,7 +67,7 @@ class Program:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the functions, in order."""
+        """Names of the functions, in order."""
         return tuple(f.name for f in self.functions)
 
     def named(self, name: str) -> Function:
@@ -139,7 +139,7 @@ def _written(drafts: Drafts, wanted: Sequence[Draft], rolls: Rolls) -> dict[str,
 
 
 def _rolls(dialect: Dialect, rolled: Rolling, late: set[Node], like: Program | None) -> Rolls:
-    """Of a function, by name and number of its steps, how many statements loops have to save; None: it gets none.
+    """The statements that loops of a function, by its name and number of steps, have to save; None: it gets none.
 
     Steps of the prologue that wait until a function runs are read from nowhere: with these everything is straight-line.
     """

@@ -2,7 +2,7 @@
 itself.
 
 States are chosen among many random ones, so that as many statements as possible change a result where they are changed; see
-symdyn.backend.exercised. How well that works is measured by corrupting written files: `python -m symdyn.lab.mutants`.
+symdyn.backend.exercised. The choice is measured by corrupting written files: `python -m symdyn.lab.mutants`.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ class _Search:
         return {name: np.array([float(value)]) for name, value in values.items()}
 
     def _effects(self, name: str, points: Mapping[str, np.ndarray], n: int) -> list[set[Any]]:
-        """For each point the statements of a function that it exercises, in the tape that is used there; none where the function
+        """The statements of a function that each point exercises, in the tape that is used there; none where the function
         calls another one that has no text in Python."""
         regular, singular = self.whole[name]
         try:
@@ -274,7 +274,7 @@ def result_at(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> Re
     try:
         exact, positive = (r.ravel() for r in evaluate(checked, values, DIGITS).values())
         double = next(iter(evaluate(tape, values, 16).values())).ravel()
-        # In floats numeric algorithms regularize what at more digits they solve.
+        # Numeric algorithms regularize in floats what they solve at more digits.
         floats = next(iter(evaluate_rows(tape, values, 1).values())).ravel()
     except (ArithmeticError, ValueError, TypeError, UnsupportedExpression):  # also comparisons of complex numbers
         return None

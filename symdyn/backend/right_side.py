@@ -1,4 +1,4 @@
-"""What a right-hand side is made with, when it is more than the function `rhs`: what identifies the library that holds it."""
+"""The options of a right-hand side that is more than the function `rhs`; they identify the library that holds it."""
 
 from __future__ import annotations
 

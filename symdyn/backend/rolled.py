@@ -1,9 +1,9 @@
 """Writes a function of many like steps as loops: what bodies that are alike repeat stands once, over arrays of what differs.
 
 The steps are taken in the order in which they are recorded, and results are stored right after they are computed; so every
-value is computed as in straight-line code, by the same operations from the same values. What a step of a loop reads is found by
-comparing all trips: the same value in all, a value of the same trip, one of the trip before, or an entry of an array, at an index
-that grows by the same number from trip to trip or, where it does not, stands in a table.
+value is computed as in straight-line code, by the same operations from the same values. The values that a step of a loop reads
+are found by comparing all trips: the same value in all, a value of the same trip, one of the trip before, or an entry of an
+array, at an index that grows by the same number from trip to trip or, where it does not, stands in a table.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
 # Steps of the tape that are not repeated: numeric algorithms and their results.
 _ALONE = ("call", "item")
-# What a step reads besides leaves and constants, which are named by their groups.
+# Values that a step reads besides leaves and constants, which are named by their groups.
 _NUMBER, _STEP = "number", "step"
 # The arrays that these stand in; leaves and constants stand in those of their groups.
 _ARRAYS = {_STEP: "w", "sin": "w", "cos": "w"}
@@ -71,7 +71,7 @@ _Step = Node | _Store | _Sines
 
 @dataclass(frozen=True)
 class _Kept(Mapping[Node, tuple[str, int]]):
-    """What is read from arrays by steps that are computed apart: constants, sines, and steps before the first of these."""
+    """Values that steps computed apart read from arrays: constants, sines, and steps before the first of these."""
 
     of: Rolled
     first: int
@@ -130,7 +130,7 @@ class Rolled:
         self.angles = list(dict.fromkeys(n.args[0] for n in self.at_once))
         self.steps: list[Any]
         self.steps, self.at = self._in_order()
-        # Where the steps of the tape stand among what is read; the last one is that of numbers.
+        # Indices of the steps of the tape among what is read; the last one is that of numbers.
         self._numbers = np.full(len(self.arrays.steps) + 1, -1)
         self._numbers[self.at] = np.arange(len(self.steps))
         self._numbers[-1] = -1
@@ -167,7 +167,7 @@ class Rolled:
         computed = np.zeros(len(arrays.steps), dtype=bool)
         computed[body] = True
         computed &= ~arrays.marked(self.at_once)
-        # In an order, the steps that are not the tape's stand as -1, -2, ...
+        # Steps that are not the tape's stand in an order as -1, -2, ...
         others: list[_Step] = []
         behind: dict[int, list[int]] = {}
         first: list[int] = []
@@ -317,7 +317,7 @@ class Rolled:
                 self.index[loop.begin + r:loop.end:loop.length] = records[_SPARE:-_SPARE] + f
                 spare.update(int(k) + f for k in (*records[:_SPARE], *records[-_SPARE:]))
             size += len(fields) * (loop.trips + 2 * _SPARE)
-            # What is read after the last trip only is overwritten by each.
+            # Each trip overwrites what is read after the last one only.
             for r in last:
                 self.index[loop.begin + r:loop.end:loop.length] = size
                 size += 1
@@ -430,7 +430,7 @@ class _LoopWriter:
         within = {core for args, step in zip(values, steps, strict=True) if isinstance(step, Node) for core in cores_of(args)}
         carried = {key[1]: leaf for key, leaf in self.outside.items() if key[0] == "before"}
         used.update(self.nodes[r] for r in kept)
-        # What the next trip reads needs a variable: what it replaces may be read until the end of the trip.
+        # A value that the next trip reads needs a variable: the one that it replaces may be read until the end of the trip.
         for r in carried:
             used[self.nodes[r]] += 2
         if rolled.inlined is not None:

@@ -29,7 +29,7 @@ ORDERS = 30
 
 @dataclass(frozen=True, kw_only=True)
 class Series(Gathered):
-    """What the template of the method gets.
+    """The functions and sizes for the template of the method.
 
     program   of the functions: order 0, which hands on n_0 numbers, and any other order
     n_sums    sums, which are done in blocks of n_block, on vectors of n_lanes

@@ -57,18 +57,18 @@ from symdyn.turning import is_angle, turns
 if TYPE_CHECKING:
     from symdyn.given import Rolling
 
-# What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
+# Functions by which the integrator keeps a state on its constraints, if there are all: of positions, of speeds, and their scale.
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
 EVENTS = "events"
-# What algorithms need for many states at once.
+# The module that algorithms need for many states at once.
 _STATES = "symdyn.tape.algorithms.states"
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
 @dataclass(frozen=True)
 class Content:
-    """What to emit: tapes by function name, their titles, and the names behind every group of arguments.
+    """Tapes to emit by function name, their titles, and the names behind every group of arguments.
 
     groups   names in the groups q, u, z, ud, inputs, p, in order; units: name -> unit; defaults: name -> number
     outputs  user outputs: (name, shape) in the order of the function `outputs`
@@ -114,7 +114,7 @@ class Source:
 
 
 def template_folders(extra: str | os.PathLike | None = None) -> list[Path]:
-    """Where templates are looked for: the user's folder, then the shipped ones (in the wheel or in the checkout).
+    """Folders in which templates are looked for: the user's folder, then the shipped ones (in the wheel or in the checkout).
 
     Raises SymdynError if the user's folder does not exist.
     """
@@ -182,7 +182,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     record = method_of(method)
     asks = integrator and backend == "c" and record.gather is not None
     gathered = record.gather(content, program, dialect, leaves) if asks and record.gather is not None else Gathered()
-    # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
+    # A module that is only loaded is compiled as several units; the functions of a series belong to the integrator.
     divides = backend == "c" and integrator and not standalone and lanes is None and not threads and record.template != "taylor"
     context = _context(content, program, dialect, Options(standalone, threads, divides), _reader(environment), record, gathered,
                        integrator, lanes, many, single, 0 if only else states)
@@ -220,13 +220,13 @@ def _check_single(name: str, program: Program) -> None:
 
 
 def template_environment(*folders: Path) -> jinja2.Environment:
-    """For templates of text that is no page: undefined names are errors, and block statements leave no lines behind."""
+    """The environment of templates of text: undefined names are errors, and block statements leave no lines behind."""
     return jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
 
 
 def _reader(environment: jinja2.Environment) -> Callable[[str], str]:
-    """What reads the parts of the runtime in C."""
+    """The function that reads the parts of the runtime in C."""
     def read(name: str) -> str:
         assert environment.loader is not None
         return environment.loader.get_source(environment, f"c/runtime/{name}")[0]
@@ -239,7 +239,8 @@ _shipped = functools.cache(template_environment)
 
 
 def with_violation(content: Content) -> Content:
-    """With corrections also the function `violation`, their residuals alone: a look whether a correction was enough."""
+    """The content, with the function `violation` where it has corrections: their residuals alone, which show whether they were
+    enough."""
     if not all(n in content.tapes for n in CORRECTIONS):
         return content
     position, velocity = (content.tapes[n].outputs[n].entries for n in CORRECTIONS[:2])
@@ -251,7 +252,7 @@ def with_violation(content: Content) -> Content:
 
 
 def _template_fault(template: str, error: Exception) -> str:
-    """Which template is wrong, in which line, and why."""
+    """The message which template is wrong, in which line, and why."""
     if isinstance(error, jinja2.TemplateNotFound):
         return f"template {template} needs {error.name}, which is in none of the template folders"
     if isinstance(error, jinja2.TemplateSyntaxError):
@@ -346,7 +347,7 @@ def _algorithms(program: Program) -> Algorithms:
 
 
 def _header(content: Content, program: Program) -> list[str]:
-    """What every argument is: order, unit, default."""
+    """Lines that document every argument: order, unit, default."""
     lines = ["SI units, radians. State x = [q; u; z]. Arguments, in order:"]
     for group, title in _SYMBOLS.items():
         names = content.groups[group]

@@ -77,7 +77,8 @@ class Writer:
         return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), stored)
 
     def results_of(self, entries: Sequence[Any], stored: Sequence[int] | None = None) -> Callable[[], tuple[str, ...]]:
-        """What stores the entries as result, once their text is known; stored: the indices of those that this part stores."""
+        """The function that stores the entries as result, once their text is known; stored: the indices of those that this part
+        stores."""
         zeros = self.dialect.zeros if sum(map(is_zero, entries)) >= _MANY_ZEROS else None
         indices = range(len(entries)) if stored is None else stored
         begin = (zeros.format(n=len(entries)),) if zeros is not None and not (indices and indices[0]) else ()
@@ -85,7 +86,7 @@ class Writer:
                                   for k in indices if zeros is None or not is_zero(entries[k])))
 
     def keep(self, nodes: Sequence[Node], slots: Mapping[Node, int]) -> tuple[str, ...]:
-        """What keeps values for later parts."""
+        """Statements that keep values for later parts."""
         assert self.dialect.parts is not None
         return tuple(self.dialect.parts.store.format(k=slots[n] + self.dialect.first, value=self.printer.text(n))
                      for n in nodes)
@@ -268,7 +269,7 @@ def taken_at_once(body: Sequence[Node], dialect: Dialect) -> list[Node]:
 
 
 def checks_of(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
-    """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
+    """Values that must be positive for these steps: pivots that they divide by, not those that another function divides by."""
     asked = [n for n in steps if n.op == "div" or n.op in STOPPING]
     divisors = {unsigned(n.args[1]) if n.op == "div" else n for n in asked}
     return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}

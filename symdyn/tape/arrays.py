@@ -12,7 +12,7 @@ import numpy as np
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.ops import OPERATIONS
 
-# What is no statement.
+# Operations that are no statements.
 _READ = ("leaf", "neg")
 _NUMBERS = {op: k for k, op in enumerate(("leaf", *OPERATIONS))}
 
@@ -54,16 +54,16 @@ class Arrays:
 
     @cached_property
     def running(self) -> np.ndarray:
-        """Which steps must be evaluated at every state: those that depend on more than parameters, (n,)."""
+        """Whether each step must be evaluated at every state, since it depends on more than parameters, (n,)."""
         return (self.masks & ~PARAMETER != 0) & ~self.does(*_READ)
 
     @cached_property
     def prologue(self) -> np.ndarray:
-        """Which steps depend on parameters only, (n,)."""
+        """Whether each step depends on parameters only, (n,)."""
         return (self.masks == PARAMETER) & ~self.does(*_READ)
 
     def does(self, *ops: str) -> np.ndarray:
-        """Which steps are one of these operations, (n,)."""
+        """Whether each step is one of these operations, (n,)."""
         return np.isin(self.ops, [_NUMBERS[op] for op in ops])
 
     def indices(self, values: Iterable[Any]) -> np.ndarray:
@@ -76,7 +76,7 @@ class Arrays:
         return int(self._indices[min(node.index, len(self._indices) - 1)])
 
     def marked(self, values: Iterable[Any]) -> np.ndarray:
-        """Which steps are among the values, (n,)."""
+        """Whether each step is among the values, (n,)."""
         result = np.zeros(len(self.steps) + 1, dtype=bool)
         result[self.indices(values)] = True
         return result[:-1]
@@ -86,6 +86,6 @@ class Arrays:
         return tuple(compress(self.steps, which.tolist()))
 
     def read_by(self, which: np.ndarray) -> np.ndarray:
-        """How often each step is read, with or without a sign, by the steps that are marked, (n,)."""
+        """The number of times that each step is read, with or without a sign, by the steps that are marked, (n,)."""
         cores = self.cores[which[self.readers]]
         return np.bincount(cores[cores >= 0], minlength=len(self.steps))

@@ -18,7 +18,7 @@ from symdyn.tape.passes import ARITHMETIC, rebuild
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, unsigned
 
-# How long an operation takes, in additions.
+# The time that an operation takes, in additions.
 _LATENCY = {"add": 1, "sub": 1, "mul": 1, "div": 4, "sqrt": 5, "neg": 0}
 _FUNCTION = 10
 _SUMS = ("add", "sub")
@@ -174,12 +174,12 @@ class _Balancer:
 
 
 def _free_sums(tape: Tape) -> np.ndarray:
-    """Which steps are sums whose terms may be taken in any order, (n,)."""
+    """Whether each step is a sum whose terms may be taken in any order, (n,)."""
     return tape.arrays.does(*_SUMS) & (tape.arrays.masks & ~PARAMETER != 0)
 
 
 def _inner_sums(tape: Tape) -> np.ndarray:
-    """Which steps are sums that are used once, by another sum, and have neither a name nor a check: their order is free, (n,)."""
+    """Whether each step is a sum that is used once, by another sum, and has neither a name nor a check: its order is free."""
     arrays, free = tape.arrays, _free_sums(tape)
     results = [unsigned(e) for o in tape.outputs.values() for e in o.entries]
     kept = arrays.marked([*tape.recorder.names, *tape.recorder.checks, *results])

@@ -1,8 +1,8 @@
-"""How many cycles a processor takes for a tape: an estimate from the steps alone, the same on every machine.
+"""The number of cycles that a processor takes for a tape: an estimate from the steps alone, the same on every machine.
 
 The processor is a model of current ones: in a cycle it begins at most WIDTH instructions of the tape, each as soon as what
-it needs is there, and it looks no more than WINDOW instructions beyond the oldest that is not finished. Where little waits
-this comes to instructions / WIDTH, in a chain whose steps wait for each other to the sum of their latencies, else to
+it needs is there, and it looks no more than WINDOW instructions beyond the oldest that is not finished. This comes to
+instructions / WIDTH where little waits, in a chain whose steps wait for each other to the sum of their latencies, else to
 something in between.
 
 Sources: latencies from A. Fog, Instruction tables (AMD Zen 3; cores of Intel and Arm differ by a cycle); WINDOW is the 64

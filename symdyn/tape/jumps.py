@@ -1,4 +1,4 @@
-"""Where expressions may jump: what their signs, conditions and floors change at, for the search of chattering."""
+"""Surfaces at which expressions may jump, where their signs, conditions and floors change, for the search of chattering."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Jump(NamedTuple):
 
 
 def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
-    """Where these entries may jump along a motion, each surface once; kinks, of abs, min and max, do not count."""
+    """Jumps of these entries along a motion, each surface once; kinks, of abs, min and max, do not count."""
     result: dict[Any, Jump] = {}
     for node in reachable(entries):
         if not node.mask & _MOVING:

@@ -28,7 +28,7 @@ _REWRITTEN: dict[type, Callable[..., sp.Expr]] = {
     sp.Mod: lambda a, b: a - b * sp.floor(a / b), sp.sinc: lambda x: sp.Piecewise((sp.sin(x) / x, sp.Ne(x, 0)), (1, True)),
     sp.frac: lambda x: x - sp.floor(x), sp.erfc: lambda x: 1 - sp.erf(x),
 }
-# Where SymPy has curves of muscles and tendons, which are written out in the order of operations that keeps their digits.
+# The module of SymPy with curves of muscles and tendons, written out in the order of operations that keeps their digits.
 _CURVES = "sympy.physics.biomechanics.curve"
 _RECIPROCAL = {sp.sec: "cos", sp.csc: "sin", sp.cot: "tan", sp.sech: "cosh", sp.csch: "sinh", sp.coth: "tanh"}
 

@@ -2,7 +2,7 @@
 
 With a_k = a^(k)(t) / k! the coefficients of a product are the convolution of those of its factors, and a function y of a
 fulfils y' = (dy/da) a', another convolution. The terms of each with both indices from 1 to k - 1 are known from lower orders:
-they are sums S_k = sum_(j=1)^(k-1) a_j b_(k-j), which can be taken all at once. What is left of order k is linear in what is new,
+they are sums S_k = sum_(j=1)^(k-1) a_j b_(k-j), which can be taken all at once. The rest of order k is linear in what is new,
 and is recorded on the tape again; where a factor does not move, nothing of the convolution is left.
 
 Sources: Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
@@ -48,7 +48,7 @@ class Series:
 
     @property
     def borders(self) -> tuple[int, ...]:
-        """Where what `next` gives begins and ends: x', left factors, right factors."""
+        """Ends of the parts of what `next` gives: x', left factors, right factors."""
         return 0, self.n_x, self.n_x + self.n_s, self.n_x + 2 * self.n_s
 
 

@@ -41,7 +41,7 @@ from symdyn.turning import turns
 
 VERSIONS = (3, 2)
 KINDS = ("model_exchange", "co_simulation")
-# Of a step of co-simulation, where the importer gives none.
+# The tolerance of a step of co-simulation where the importer gives none.
 TOLERANCE = 1e-9
 # An FMU allocates memory and compares texts; the package of tcc brings neither the headers of libc nor the paths to them.
 NO_HEADERS = ("the C compiler found is tcc, which does not find the headers of the C library; install gcc or clang, or set "
@@ -49,7 +49,7 @@ NO_HEADERS = ("the C compiler found is tcc, which does not find the headers of t
 _LIBRARY = ".dll" if sys.platform == "win32" else ".dylib" if sys.platform == "darwin" else ".so"
 _MACHINES = {"amd64": "x86_64", "x64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
 _SYSTEMS = {"win32": "windows", "darwin": "darwin"}
-# What FMI 2.0 calls platforms; it has no names for others, which take those of FMI 3.0.
+# Names of platforms in FMI 2.0; it has none for others, which take those of FMI 3.0.
 _OF_VERSION_2 = {"x86_64-linux": "linux64", "x86-linux": "linux32", "x86_64-windows": "win64", "x86-windows": "win32",
                  "x86_64-darwin": "darwin64"}
 # The same bytes for the same mechanism: files of an archive have a time.

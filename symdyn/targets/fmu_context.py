@@ -90,7 +90,7 @@ class Wrapped:
 
 @dataclass(frozen=True)
 class Code:
-    """What the parts in C need of the mechanism.
+    """The mechanism as the parts in C need it.
 
     sizes          pairs of a macro and its value
     start          numbers at the start

@@ -1,4 +1,4 @@
-"""What an FMU says of its variables: references, units in powers of the base units, dependencies.
+"""The variables of an FMU in its description: references, units in powers of the base units, dependencies.
 
 Source: Modelica Association, Functional Mock-up Interface Specification 3.0, section 2.4, and version 2.0.4, section 2.2.
 """
@@ -48,7 +48,7 @@ class FmuUnit:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What is computed, and the references that it depends on; None: on all."""
+    """The reference of a variable that is computed, and those that it depends on; None: on all."""
 
     reference: int
     depends: tuple[int, ...] | None
@@ -56,7 +56,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class References:
-    """Where the variables of each kind begin: the time is 0."""
+    """References of the first variable of each kind; the time is 0."""
 
     n_x: int
     n_inputs: int

@@ -241,8 +241,8 @@ def _lines(names: Sequence[str]) -> list[str]:
 
 
 def _clauses(metadata: ModuleMetadata, x: Sequence[str], events: Sequence[str], resets: Sequence[str]) -> list[list[Clause]]:
-    """What happens at events and where unit quaternions have drifted; in one list what sets the same states, of which only one
-    clause may do so at a time."""
+    """Clauses for events and for unit quaternions that have drifted; those that set the same states are in one list, of which
+    only one may do so at a time."""
     rest = iter(resets)
     clauses = []
     for event, value in zip(metadata.events, events, strict=True):
@@ -307,7 +307,7 @@ def _samples(metadata: ModuleMetadata, content: Content, identifiers: Mapping[st
 
 
 def _claims(content: Content, function: str, variables: Sequence[str], values: Mapping[str, float]) -> list[tuple[str, str]]:
-    """What a function gives at a state, where it is defined there."""
+    """Claims about the results of a function at a state, if it is defined there."""
     tapes: list[Tape | None] = [content.tapes.get(function), content.singular_fallback.get(function)]
     for tape in tapes:
         result = result_at(function, tape, values, "") if tape is not None else None

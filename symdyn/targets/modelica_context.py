@@ -30,7 +30,7 @@ class ModelicaModel:
 
 @dataclass(frozen=True)
 class Variable:
-    """What is declared: its name with its size, attributes in brackets, the value it is bound to, a description."""
+    """A variable as it is declared: its name with its size, attributes in brackets, the value it is bound to, a description."""
 
     name: str
     attributes: str
@@ -67,7 +67,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Clause:
-    """What happens when a condition becomes true: values that states are set to, and the words that a simulation ends with."""
+    """Actions when a condition becomes true: values that states are set to, and the words that a simulation ends with."""
 
     condition: str
     resets: tuple[tuple[str, str], ...]

@@ -1,4 +1,4 @@
-"""What a mechanism starts with in a program of its own, such as an FMU or a Modelica model."""
+"""The start of a mechanism in a program of its own, such as an FMU or a Modelica model."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Gauss collocation of 8 stages: order 16, symmetric, it keeps quadratic invariants such as the norm of Euler parameters.
 
-In coordinates and speeds it is symplectic where the mass matrix is constant, elsewhere symmetric and reversible. In canonical
-variables (q, M_tilde u) it took 1.1 to 1.5 times as much for the same energy over 1e6 steps of chaotic pendulums and chains.
+It is symplectic in coordinates and speeds where the mass matrix is constant, elsewhere symmetric and reversible. It took 1.1 to
+1.5 times as much in canonical variables (q, M_tilde u), for the same energy over 1e6 steps of chaotic pendulums and chains.
 
 Steps have one length: a given one is kept whatever the tolerance; else it is found on the way, and a step whose error is not
 tolerated is made up of equal parts. Stages 4, 6, 8, 10 were tried: 8 took the fewest evaluations for energies to rounding.
@@ -72,7 +72,7 @@ COEFFICIENTS = Gauss(
 
 @dataclass(frozen=True, kw_only=True)
 class OfGauss(Gathered):
-    """What the template gets: the coefficients."""
+    """The coefficients for the template."""
 
     coefficients: Gauss = COEFFICIENTS
 

@@ -60,7 +60,7 @@ class Collocation:
 
 @dataclass(frozen=True, kw_only=True)
 class OfRadau(Gathered):
-    """What the template gets: the coefficients."""
+    """The coefficients for the template."""
 
     coefficients: Collocation
 

@@ -1,4 +1,4 @@
-"""What a template needs to know of a method of integration."""
+"""The record of a method of integration, for its template."""
 
 from __future__ import annotations
 
