@@ -324,7 +324,7 @@ class Chain:
         return bridge
 
     def _instant(self, t: float, x: np.ndarray, number: int) -> Instant:
-        """What happens at an instant."""
+        """Events at an instant."""
         assert self.record is not None
         near = 1e-9 * abs(self.request.span[1] - self.request.span[0])
         times = [self.request.span[0], *[cut.t for cut in self.cuts]]

@@ -41,7 +41,8 @@ class Breaks:
         return cls(module, tape, abs(span[1] - span[0]))
 
     def crossed(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Which of steps of lengths h (n,) cross a surface and are too long, by times, states and inputs at all stages."""
+        """Mask of the steps of lengths h (n,) that cross a surface and are too long, by times, states and inputs at all
+        stages."""
         from symdyn.tape.floats import evaluate_rows
 
         metadata = self.module.metadata

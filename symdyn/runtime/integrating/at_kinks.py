@@ -1,6 +1,6 @@
 """Derivatives of motions that stay at a kink, such as that of |x| at x = 0, and of losses that end at one: there are none.
 
-A motion that passes a kink has derivatives: it is there for no time. Of a smooth function f(x + h) + f(x - h) - 2 f(x) vanishes
+A motion that passes a kink has derivatives: it is there for no time. For a smooth function f(x + h) + f(x - h) - 2 f(x) vanishes
 like h^2; at a kink like h.
 """
 

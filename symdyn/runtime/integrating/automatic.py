@@ -120,8 +120,8 @@ def _stiffness(module: Module, request: Request, trial: Trial, explicit: str, st
             ringing = modes.ringing(request.atol[:n] + request.rtol * np.abs(x))
             if ringing is None or not _outlasted(ringing.time, length, to_come, modes.radius):
                 return "", f"{doubt} ({limited})"
-            # What rings now dies out early, and stability limits explicit steps from then on. Implicit steps that tolerate
-            # it damp it at once; from there the true ones are tried.
+            # A vibration that rings now dies out early, and stability limits explicit steps from then on. Implicit steps that
+            # tolerate it damp it at once; from there the true ones are tried.
             most = min(to_come / STIFF_STEPS, request.max_step or np.inf)
             calm = trial(replace(later, atol=ringing.amplitudes, rtol=LARGEST, max_step=most), stiff)
             later = replace(later, span=(float(calm.t[-1]), request.span[1]), x0=calm.x[-1][:n].copy())
@@ -162,7 +162,7 @@ def _doubt(module: Module, result: Outcome, request: Request, product: float, to
 
 
 class Rough(NamedTuple):
-    """Which entry of a state is least smooth, by how much of its range it departs from a cubic, and how much a smooth one may."""
+    """Least smooth entry of a state, by how much of its range it departs from a cubic, and how much a smooth one may."""
 
     entry: int
     missed: float
@@ -183,7 +183,7 @@ def _roughest(t: np.ndarray, x: np.ndarray, rtol: float, atol: np.ndarray) -> Ro
 
 
 class Ringing(NamedTuple):
-    """What of a state vibrates quickly and dies out: how far, (n,), and the time until it is tolerated, s."""
+    """Part of a state that vibrates quickly and dies out: its amplitude, (n,), and the time until it is tolerated, s."""
 
     amplitudes: np.ndarray
     time: float
@@ -218,7 +218,7 @@ class Modes:
         return float(np.abs(self.values[self.values.real <= 1e-6 * np.abs(self.values)]).max(initial=0.0))
 
     def ringing(self, tolerated: np.ndarray) -> Ringing | None:
-        """What the modes near the largest eigenvalue add to the state, and how long it lasts; None if it stays or cannot be
+        """Contribution to the state of the modes near the largest eigenvalue, and its duration; None if it stays or cannot be
         reported."""
         fast = np.abs(self.values) >= FAST * self.radius
         decay = -self.values[fast].real

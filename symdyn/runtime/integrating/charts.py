@@ -23,7 +23,7 @@ INSTEAD = "take EulerParameters, or another sequence"
 
 
 def distances(module: Module, x: np.ndarray) -> np.ndarray:
-    """How far the angles of every chart are from gimbal lock, rad, (n, n_charts), of rows of states."""
+    """Distances of the angles of every chart from gimbal lock, rad, (n, n_charts), of rows of states."""
     names, rows = module.metadata.x, np.atleast_2d(x)
     result = []
     for _, sequence, _, name in module.metadata.charts:

@@ -22,7 +22,7 @@ SWITCHES = "switches"
 # Looks in a row that find the motion on the same surface before it counts as sliding there; steps between the looks, of compiled
 # methods and of SciPy's.
 LOOKS, STEPS, STEPS_OF_SCIPY = 3, 1000, 150
-# How many steps away from a surface, at the rate it is passed with, a motion that slides along it may be.
+# Largest distance from a surface of a motion that slides along it, in steps at the rate of crossing.
 NEAR = 100.0
 # The same where steps have become too small to go on, s.
 WITHIN = 1e-6

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Attempted steps in one call; a fraction of a second even for large systems.
 PIECE = 20_000
 STEPS_AT_ONCE = 4096
-# A step whose error was tolerated and that is moved by more tolerances has lost digits. Of 720 runs across singular
+# A step whose error was tolerated and that is moved by more tolerances has lost digits. Among 720 runs across singular
 # configurations those whose sensitivities lost a hundred tolerances or more were moved by 4,000 to 6e8; regular runs by 12 at
 # most.
 FAR = 1000.0
@@ -135,7 +135,7 @@ class Run:
 
     @property
     def raised(self) -> InputRaised | None:
-        """What a function of inputs raised, if it did."""
+        """Error that a function of inputs raised, if any."""
         return self.trouble[0] if self.trouble and isinstance(self.trouble[0], InputRaised) else None
 
     def at(self, times: np.ndarray, x: np.ndarray, limit: int) -> int:
@@ -186,7 +186,8 @@ class Run:
 
 def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
                  field: RightSide | None = None) -> Outcome:
-    """Integrate with a compiled method, by default the plain right-hand side. What a function of inputs raises ends the run.
+    """Integrate with a compiled method, by default the plain right-hand side. An error that a function of inputs raises ends the
+    run.
 
     Raises ArgumentError where such a function returns what does not fit.
     """

@@ -22,7 +22,7 @@ from symdyn.errors import EvaluationError
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Of the time, the state, parameters and inputs.
+# Function of the time, the state, parameters and inputs.
 Function = Callable[[float, np.ndarray, np.ndarray, Any], np.ndarray]
 # Steps of differences, of the sizes of what they are of, and how exactly two orders have to agree.
 STEPS, AGREE, ENOUGH = (1e-3, 1e-4, 1e-5), 1e-6, 1e-11
@@ -189,7 +189,7 @@ class Switch:
         return best
 
     def _scale(self, one: Moves) -> float:
-        """How large a change is, by the sizes of what it changes."""
+        """Size of a change, relative to the quantities that it changes."""
         n_q = self.module.metadata.sizes.q
         of_q = max(float(np.abs(self.before[:n_q]).max(initial=0.0)), SMALL)
         of_rest = max(float(np.abs(self.before[n_q:]).max(initial=0.0)), of_q / self.since)

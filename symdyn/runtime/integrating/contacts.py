@@ -66,7 +66,7 @@ NO_SPEED = 1e-11
 MOST_SWITCHES, SAME_TIME, MOST_SHORT = 50, 1e-13, 1000
 # So many that follow each other faster than one in a step of time stepping are left to it, where method="auto" may.
 MOST_FAST = 200
-# What is added to the diagonal of rows that depend on each other, by its size.
+# Number added to the diagonal of rows that depend on each other, relative to its size.
 SOFTNESS = 1e-8
 STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Energy that an impact adds counts from this part of its work on.
@@ -193,7 +193,8 @@ def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
 
 
 def not_stepped(records: Sequence[ContactRecord]) -> list[str]:
-    """What of contacts method="moreau" does not take, whose steps of one length go across switches: parts of a message."""
+    """Properties of contacts that method="moreau" does not take, whose steps of one length go across switches: parts of a
+    message."""
     result = []
     others = {record.contact: record.impact for record in records if record.impact != "newton"}
     if others:
@@ -269,7 +270,7 @@ def _without_columns(part: Request) -> Request:
 
 
 class Made(NamedTuple):
-    """What was done to the state at a switch: put onto the surfaces of contacts by modes and whether they slip, or, where
+    """Change of the state at a switch: put onto the surfaces of contacts by modes and whether they slip, or, where
     contacts are hit, an impact."""
 
     modes: tuple[str, ...]
@@ -288,7 +289,7 @@ class _Stop(Exception):
 
 @dataclass
 class _Doubt:
-    """What to warn of, once for all instants of its kind: the text of the most important one, and how often it was so again."""
+    """Warning, given once for all instants of its kind: the text of the most important one, and how often it was so again."""
 
     text: str
     weight: float

@@ -86,7 +86,7 @@ class Stabilized:
         self.status = self.solver.status
 
     def residual(self, t: float, y: np.ndarray, yd: np.ndarray) -> np.ndarray:
-        """Of the form, (n_x + 2 n_c,); NaN where it cannot be evaluated, which the field keeps the reason of."""
+        """Residual of the form, (n_x + 2 n_c,); NaN where it cannot be evaluated, which the field keeps the reason of."""
         state = y[:self.n_x]
         inputs = self.field.given(t, state)
         try:
@@ -111,7 +111,7 @@ class Stabilized:
         return lambda t: np.asarray(polynomials(t)[0][:self.n_x])
 
     def __getattr__(self, name: str) -> Any:
-        """Whatever else is asked for, such as the direction and what was counted, is the solver's own."""
+        """All other attributes, such as the direction and the counts, are the solver's own."""
         return getattr(self.solver, name)
 
     @property

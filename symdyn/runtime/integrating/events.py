@@ -42,9 +42,9 @@ class Happened(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """What a run takes over from the one before it, at whose end it begins: sides of the quantities of events, (n_e,), 0 where
-    unknown; of those that have just vanished rates (n_e,), a second, NaN of all others, and what was left of them, (n_e,); reset:
-    whether the state was changed since.
+    """Values that a run takes over from the one before it, at whose end it begins: sides of the quantities of events, (n_e,), 0
+    where unknown; of those that have just vanished rates (n_e,), a second, NaN of all others, and their remainders, (n_e,);
+    reset: whether the state was changed since.
     """
 
     sides: np.ndarray
@@ -54,7 +54,7 @@ class Carried(NamedTuple):
 
 
 def wanted(module: Module, asked: Any) -> np.ndarray:
-    """Which of the module's events are looked for, (n_e,) of bool; asked: True, False or names.
+    """Mask of the module's events that are looked for, (n_e,) of bool; asked: True, False or names.
 
     Raises ArgumentError for names that the mechanism has no event of.
     """

@@ -148,7 +148,7 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
 
 def _way(module: Module, request: Request, method: str, carried: Sequence[str],
          breaks: Breaks | None) -> Way | Chain | ContactChain:
-    """What goes forth and back; in pieces where events are looked for, controllers hold inputs, or contacts switch."""
+    """Way forth and back; in pieces where events are looked for, controllers hold inputs, or contacts switch."""
     if module.metadata.contacts:
         switches: list[Switch] = []
         return ContactChain(module, request, method, carried, _checked_run(module, request, method, switches), switches,

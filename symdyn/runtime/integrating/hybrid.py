@@ -1,8 +1,8 @@
 """Motions with rigid contacts that go from phase to phase in C, as far as they need nothing that has to be thought about.
 
 The switches of symdyn.runtime.integrating.contacts in a plane, with Newton's law of impacts, of contacts whose rows do not depend
-on each other, are made in C between phases of the compiled integrator. Whatever else comes, such as several solutions, bouncing
-that ends, failures, is left to Python, after which C goes on.
+on each other, are made in C between phases of the compiled integrator. All else, such as several solutions, bouncing that ends
+and failures, is left to Python, after which C goes on.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Laws(NamedTuple):
 
 
 class Done(NamedTuple):
-    """What C has done in one call: why it ended; of each phase its begin, end, parameters (n, n_p), modes (n, n_contacts), and by
+    """Results of one call of C: why it ended; of each phase its begin, end, parameters (n, n_p), modes (n, n_contacts), and by
     its end the numbers of output times, events and impacts; output times with states, events with their times and the states
     before and after them (n, 2, n_x), impacts with their times, impulses and velocities before and after them (n, 3, n_rows)."""
 
@@ -98,7 +98,7 @@ class Done(NamedTuple):
 
 
 def of(module: Module, request: Request, method: object) -> Motion | None:
-    """What makes motions like this one in C; None where nothing of it could be made there."""
+    """Motion of this kind in C; None where nothing of it could be made there."""
     inputs = request.inputs
     varies = inputs.function is not None or inputs.pieces is not None or inputs.motions is not None or inputs.are_held
     if (method not in METHODS or varies or len(inputs.kinks) or request.columns or request.times is None or request.step
@@ -180,7 +180,7 @@ class Motion:
         self._functions()
 
     def _functions(self) -> None:
-        """What frames evaluate."""
+        """Functions that frames evaluate."""
         self.seen = np.zeros(1), np.zeros(max(1, self.n_state)), self.inputs
         self.memory.take(self.record, "t_now", self.seen[0])
         self.memory.take(self.record, "x_now", self.seen[1])

@@ -96,7 +96,7 @@ class Jump:
         return 0.0
 
     def rate(self) -> float:
-        """Of the quantity that sets the time, along the motion before it."""
+        """Rate of the quantity that sets the time, along the motion before it."""
         g_x, g_t, _ = self.derivatives("events")
         return float(g_t[self.first] + g_x[self.first] @ self.slope)
 
@@ -142,7 +142,7 @@ class Jump:
         return float(2 * near - far)
 
     def derivatives(self, of: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a function by the state before, by the time, and by what is carried."""
+        """Derivatives of a function by the state before, by the time, and by the carried quantities."""
         module, request, metadata = self.way.module, self.way.request, self.way.module.metadata
         inputs = request.inputs.rows(np.array([self.t]), self.x[None, :])[0]
         J: Any = module.jacobian(self.t, self.x, request.p, inputs, ["x", "t", "params", "inputs"], of)

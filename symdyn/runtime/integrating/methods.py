@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 DEFAULT, SERIES = METHOD, "taylor"
-# What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
+# Tolerances are no smaller than doubles resolve: with less, no step would ever be good enough.
 SMALLEST_RTOL = 1e-15
 # Bytes of the matrices of an implicit method beyond which a factorization takes minutes.
 LARGEST_MATRICES = 2**29
@@ -97,7 +97,7 @@ def _implicit(stages: int) -> Callable[[Module, Inputs | None], str]:
 COMPILED = {m.name: m for m in (
     CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
     CompiledMethod(SERIES, unfit=_not_expanded),
-    # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
+    # Only 10 r^(1/4) of its estimate counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
     CompiledMethod("radau", ("jacobian_x",), _implicit(5), kinked=0.01),
     CompiledMethod("radau5", ("jacobian_x",), _implicit(3), kinked=0.01),
 )}

@@ -318,7 +318,7 @@ class Stepper:
             record.most_rounds, record.step_updates = GROUP_ROUNDS, GROUP_UPDATES
 
     def _frames(self, n_x: int, n_in: int) -> None:
-        """What the record calls."""
+        """Functions that the record calls."""
         record, memory, request, module = self.record, self.memory, self.request, self.module
         t, x, inputs = np.zeros(1), np.zeros(max(1, n_x)), np.zeros(max(1, n_in))
         for name, values in (("t", t), ("x", x), ("inputs", inputs)):
@@ -386,7 +386,7 @@ class Stepper:
         return int(status), out[:k]
 
     def touched(self) -> Touched:
-        """What contacts did in all steps."""
+        """Contacts in all steps."""
         none = np.zeros(0, dtype=int)
         parts = [Touched(none, none, none, none, np.zeros((0, 10))), *self.parts]
         step, a, b, state, values = (np.concatenate(rows) for rows in zip(*parts, strict=True))
@@ -394,11 +394,11 @@ class Stepper:
 
     @property
     def cause(self) -> BaseException | None:
-        """What a function of inputs raised."""
+        """Error that a function of inputs raised."""
         return (self.raised[0].__cause__ or self.raised[0]) if self.raised else None
 
     def doubt(self) -> str:
-        """What is left of residuals and overlaps, if that is more than meant."""
+        """Warning of remaining residuals and overlaps, if they are larger than intended."""
         record = self.record
         most, missed = self.reported * record.tolerance, np.array(self.missed)
         if missed.max(initial=0.0) > most:

@@ -22,7 +22,7 @@ TOUCHING = 1e-9
 
 
 class Spheres(NamedTuple):
-    """Of all groups, at a state: unit normals and offsets of the planes (n, 4), radii (n_b,), centres (n_b, 3)."""
+    """Spheres of all groups, at a state: unit normals and offsets of the planes (n, 4), radii (n_b,), centres (n_b, 3)."""
 
     planes: np.ndarray
     radius: np.ndarray

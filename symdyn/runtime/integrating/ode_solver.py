@@ -40,7 +40,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Setting:
-    """What is integrated: the module, the method's name, parameters (n_p,), inputs for a span, what keeps the constraints."""
+    """Data of an integration: the module, the method's name, parameters (n_p,), inputs for a span, what keeps the constraints."""
 
     module: Module
     method: str

@@ -124,7 +124,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
+    """Result of an integration: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
 
     happened   events in order, see runtime.events
     doubts     what to warn of in a run that went on; warned: what was warned of on the way

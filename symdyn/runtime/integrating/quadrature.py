@@ -147,7 +147,7 @@ class Integral:
         return np.asarray(rows.max(axis=1, initial=0.0))
 
     def _estimate(self, h: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Of integrals over steps, (n, k), from values at the stages, (n, stages, k)."""
+        """Errors of integrals over steps, (n, k), from values at the stages, (n, stages, k)."""
         first = np.abs(np.einsum("j,njk->nk", self.first, values))
         if self.second is not None:
             squares = first * first
@@ -156,7 +156,7 @@ class Integral:
         return np.asarray(np.abs(h)[:, None] * first)
 
     def _noise(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, costs: Costs) -> np.ndarray:
-        """What the tolerances of the state alone make of the worst derivative of each step."""
+        """Noise that the tolerances of the state alone cause in the worst derivative of each step."""
         moved = self.request.atol + self.request.rtol * np.abs(x)
         whole = lambda rows: np.abs(h)[:, None] * np.einsum("j,njk->nk", np.abs(self.first), np.abs(rows))
         sides = []
@@ -177,14 +177,14 @@ class Integral:
         return result
 
     def _crossed(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, n: int) -> np.ndarray:
-        """Which surfaces change their sign in which of n steps; a motion that begins on one does not cross it."""
+        """Mask of the surfaces that change their sign in each of n steps; a motion that begins on one does not cross it."""
         assert self.cost.surfaces is not None
         signs = self.cost.surfaces(t, x, inputs).values.reshape(n, len(t) // n, -1)
         above = signs > 0
         return np.asarray(above.any(axis=1) & ~above.all(axis=1) & (signs[:, 0] != 0))
 
     def across(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, values: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """What the integral gains by x and the others, (n_x + n_by,), since a jump in a short step moves.
+        """Gain of the integral by x and the others, (n_x + n_by,), since a jump in a short step moves.
 
         t, x, inputs, values   at its stages; slope: of the state there
         """
@@ -237,7 +237,7 @@ def _weights(method: str) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     b = row(tableau.b)
     if tableau.second is not None:
         return b, row(tableau.e), row(tableau.second)
-    # The embedded method has the slope at the end. Of the stages that count four give a rule for polynomials of degree 3.
+    # The embedded method has the slope at the end. Four of the stages that count give a rule for polynomials of degree 3.
     times = np.array([0.0, *[tableau.c.get(j, 1.0) for j in range(1, n)]])
     taken = np.flatnonzero(b)[[0, 2, 4, 5]]
     rule = np.zeros(n)

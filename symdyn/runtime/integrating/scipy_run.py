@@ -225,7 +225,8 @@ class Run:
 
     @property
     def _next_length(self) -> float:
-        """Of the step to be tried by a new solver after a kink, s; 0: chosen, as one of several steps begins by short ones."""
+        """Length of the step to be tried by a new solver after a kink, s; 0: chosen, as one of several steps begins by short
+        ones."""
         return self.proposed if takes_changed_states(self.solver_class) else 0.0
 
     def step(self) -> None:

@@ -49,7 +49,7 @@ class Asked:
 
     @classmethod
     def of(cls, module: Module, given: Any, p: np.ndarray, inputs: Inputs) -> Asked:
-        """What is asked for by parameters, inputs and initial values. Raises ArgumentError for what does not fit."""
+        """Sensitivities requested by parameters, inputs and initial values. Raises ArgumentError for what does not fit."""
         metadata = module.metadata
         n_x = metadata.sizes.x
         if given is None:
@@ -124,7 +124,7 @@ class Asked:
                                 "other parameters follow from one, as expressions of it, or leave out what is redundant")
 
     def doubts(self, module: Module, request: Request, outcome: Outcome, steps: Callable[[], Outcome]) -> list[str]:
-        """What to warn of: columns in which everything is zero all along, jumps that no event looks for, events that graze, kinks
+        """Warnings: columns in which everything is zero all along, jumps that no event looks for, events that graze, kinks
         that the motion stays at. steps: the same motion with a row for every step, made only where the right-hand side may jump,
         or not depend on a parameter."""
         if not self.names or len(outcome.x) < 2:
@@ -166,7 +166,7 @@ class Asked:
 
 
 def zeros(module: Module, names: Sequence[str]) -> str:
-    """What to warn of where a motion does not depend on these."""
+    """Warning where a motion does not depend on these."""
     return f"{module.name}: nothing in this motion depends on {', '.join(names)}: the sensitivities are zero"
 
 
@@ -221,7 +221,7 @@ def _depend_on_state(request: Request) -> set[int]:
 
 
 def gathered(module: Module, outcome: Outcome) -> list[str]:
-    """What to warn of where impacts accumulate."""
+    """Warnings where impacts accumulate."""
     return [f"{module.name}: the impacts of {name} accumulate at t = {end:.6g} s, and what is left of them from t = {begin:.6g} "
             "s on, within the tolerances of the motion, is left out: derivatives after it lose digits, those by a restitution "
             "most of all; end the motion before it, or compare with differences"
@@ -229,7 +229,7 @@ def gathered(module: Module, outcome: Outcome) -> list[str]:
 
 
 def _grazing(module: Module, request: Request, outcome: Outcome) -> list[str]:
-    """What to warn of where an event with an effect grazes, the first one."""
+    """Warning of the first event with an effect that grazes."""
     n_x, records = module.metadata.sizes.x, module.metadata.events
     happened = [one for one in outcome.happened if not records[one.event].stop]
     if not happened:
@@ -282,7 +282,7 @@ def _jumps(module: Module, request: Request, t: np.ndarray, x: np.ndarray, row: 
 
 
 def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
-    """What sensitivities are by: parameters, inputs, initial values with the state they are of; faults are added."""
+    """Names that sensitivities are by: parameters, inputs, initial values with the state they are of; faults are added."""
     metadata = module.metadata
     if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
         parameter = f"{metadata.parameters[0]!r}, " if metadata.parameters else ""

@@ -101,7 +101,7 @@ class ShortSteps:
         to_and_fro = ways.sum(axis=0) > TO_AND_FRO * np.ptp(rates[[0, -1]], axis=0)
         weight = np.where(to_and_fro, ways.mean(axis=0) * step / np.maximum(tolerated, 1e-300), 0.0)
         k = int(weight.argmax())
-        # What goes to and fro must be what the errors of steps are about.
+        # The entries that go to and fro must be those that the errors of steps come from.
         return (k, step, float(ways[:, k].max())) if weight[k] > 1e-3 else None
 
     def _slides(self, result: Outcome, k: int) -> str:

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 N_POINTS = 1001
-# What a long integer of C holds on every platform.
+# Largest number that a long integer of C holds on every platform.
 MOST_STEPS = 2**31 - 1
 # With more, steps whose error is of the size of the motion itself pass: a double pendulum gained energy without end in 10 s from
 # 0.2 on (RK45) or 0.3 on (dop853, bs54), while at 0.1 it was wrong by a sixth at most with the compiled methods.
@@ -178,7 +178,7 @@ def looked_for(module: Module, events: Any) -> np.ndarray:
 
 
 def of_contacts(metadata: ModuleMetadata) -> np.ndarray:
-    """Which events are those of rigid contacts, (n_e,) of bool."""
+    """Mask of the events of rigid contacts, (n_e,) of bool."""
     own = {f"{c.name}_{what}" for c in metadata.contacts for what in c.events}
     return np.array([e.name in own for e in metadata.events], dtype=bool)
 
@@ -241,7 +241,7 @@ def _steps(module: Module, request: Request, method: Any, n_steps: int) -> Outco
 
 
 def stabilization_of(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
-    """What keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
+    """Method that keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
     one_step = method == MOREAU or is_compiled(method) or takes_changed_states(solver_class_of(module, method))
     chosen = choose(module, asked, one_step, str(getattr(method, "__name__", method)), request.p)
     if chosen.way != "baumgarte":
@@ -356,7 +356,8 @@ def checked_spacing(module: Module, value: Any, span: tuple[float, float]) -> fl
 
 
 def _underway(module: Module, label: str) -> str:
-    """What the bar shows while a function, or an integrator with its right-hand side, is made; empty label: the motion runs."""
+    """Text of the progress bar while a function, or an integrator with its right-hand side, is made; empty label: the motion
+    runs."""
     return f"{module.name}: first use of {label}, which is derived and compiled" if label else module.name
 
 

@@ -1,4 +1,4 @@
-"""How slips in space come to their end, where derivatives are asked for.
+"""Ends of slips in space, where derivatives are requested.
 
 Friction acts against the slip v, so that a change of v across it decays as mu N (J M^-1 J^T)/|v|: faster and faster as the slip
 comes to its end, without bound. A change that is left at the time tau before the end decays as tau^p, p = mu N g/|v_dot|, and no
@@ -18,8 +18,8 @@ import numpy as np
 # The last stretch begins where the slip is so many times what its tolerances let pass; its least part of the phase, and the one
 # from which on it is all of that.
 NOISE, LEAST, MOST = 100.0, 1e-8, 0.1
-# What rounding of speeds makes of the direction of a slip, by their size over the slip; what it makes of slips counts as so many
-# times that in addition to tolerances.
+# Effect of rounded speeds on the direction of a slip, by their size over the slip; their effect on slips counts as so many times
+# that in addition to tolerances.
 ROUNDED, NOISY = 10 * np.finfo(float).eps, 1e4
 # The shortest last stretch by the time at which it ends.
 SHORTEST = 1e3 * np.finfo(float).eps

@@ -1,4 +1,4 @@
-"""How a motion is kept on its constraints: which ways there are for a method, the projection of a state, Baumgarte's gain."""
+"""Ways to keep a motion on its constraints: those of a method, the projection of a state, Baumgarte's gain."""
 
 from __future__ import annotations
 
@@ -169,10 +169,10 @@ class Projector:
         return self._evaluate("reset_directions", t, x).reshape(-1, self.n_q + self.n_u)
 
     def impulses(self, directions: np.ndarray, places: Sequence[int], gaps: np.ndarray) -> np.ndarray:
-        """What closes gaps (n, ...) of entries `places` along their directions (n, n_q + n_u), likewise."""
+        """Impulses that close gaps (n, ...) of entries `places` along their directions (n, n_q + n_u), likewise."""
         factors, n = np.concatenate([self.lengths, self.velocities]), len(places)
         own = np.diag(directions[:, places]) * factors[places]
-        # What would take the others a million times as far is held by the constraints.
+        # Directions that would take the others a million times as far are held by the constraints.
         free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
         result = np.zeros((n, *gaps.shape[1:]))
         result[free] = _multipliers(directions[free][:, np.array(places)[free]].T, gaps[free])

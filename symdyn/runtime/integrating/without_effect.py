@@ -1,4 +1,4 @@
-"""What a motion does not depend on although its name occurs: parameters that cancel, such as a factor of all masses.
+"""Names that occur although the motion does not depend on them: parameters that cancel, such as a factor of all masses.
 
 Rounding leaves something of terms that cancel, and unstable motions magnify it without bound, so that the size of a sensitivity
 does not tell. The equations do: with other values of the parameter they give the same at all states of the motion.
@@ -28,7 +28,7 @@ def unaffected(module: Module, request: Request, names: Sequence[str], t: np.nda
     """The parameters and constant inputs among names with which neither the right-hand side nor events and their resets change by
     more than rounding, at rows x (n_t, n_x) of a motion at times t.
 
-    Each takes 1.5 times its value, and 1 more. What cannot be evaluated then is taken to depend on it.
+    Each takes 1.5 times its value, and 1 more. A motion that cannot be evaluated then counts as dependent on it.
     """
     metadata = module.metadata
     inputs = np.broadcast_to(request.inputs.rows(t, x), (len(t), metadata.sizes.inputs))
