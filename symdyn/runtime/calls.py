@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Call(NamedTuple):
-    """Arguments of a call of a function of a state; None: left out. Of t left out is 0."""
+    """Arguments of a call of a function of a state; None: left out. t is 0 where it is left out."""
 
     t: Any = None
     x: Any = None

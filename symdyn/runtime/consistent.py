@@ -79,7 +79,7 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
 
 
 def advice(module: Module, t: float) -> str:
-    """What to do about a start that is not consistent."""
+    """Advice about a start that is not consistent."""
     return (f"begin with the nearest consistent state: q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''}"
             f"{', inputs=inputs' if module.metadata.motions else ''})")
 

@@ -80,13 +80,14 @@ def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK) -
 
 
 def counted(values: np.ndarray, tolerance: float = RANK) -> np.ndarray:
-    """Which singular values (..., k), the largest first, are not zero; a Jacobian that vanishes as a whole has none."""
+    """Mask of the singular values (..., k), the largest first, that are not zero; a Jacobian that vanishes as a whole has
+    none."""
     result: np.ndarray = values > tolerance * np.maximum(values[..., :1], 1)
     return result
 
 
 def derivatives(module: Module, of: str, t: float, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of C or C_dot, as `of` says, by the state and by the parameters: (n_c, n_x), (n_c, n_p)."""
+    """Derivatives of C or C_dot, as `of` says, by the state and by the parameters: (n_c, n_x), (n_c, n_p)."""
     result = module.jacobian(t, x, p, wrt=["x", "params"], of=of)
     assert result.x is not None and result.params is not None
     return result.x, result.params
@@ -114,7 +115,7 @@ def holding(module: Module, t: float, x: np.ndarray, p: np.ndarray, parameters: 
 
 
 def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
-    """Which multipliers are unique, (..., n_c) of bool.
+    """Mask of the unique multipliers, (..., n_c) of bool.
 
     C_r^T lam fixes lam up to the kernel of C_r^T; where that has no part along a row, its multiplier is unique: its row of
     the left singular vectors of the range then has the norm 1.

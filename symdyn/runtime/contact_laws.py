@@ -2,10 +2,10 @@
 
 Both are the same problem: relative velocities (of an impact) or accelerations w = b + D lam, with lam_N >= 0, w_N >= 0 and
 lam_N w_N = 0 in every contact, and friction within Coulomb's cone. Each combination of modes is a system of linear equations,
-whose solution counts where it fulfils the inequalities. Of few contacts in a plane all combinations are solved at once: so all
-solutions are found, none or several as well (Painleve). Of more, and in space, where directions of slip are unknowns, Lemke's
-method gives the modes, in space with a cone of FACETS, which are then put right for the round one; combinations are tried one
-after the other only where that fails.
+whose solution counts where it fulfils the inequalities. All combinations of few contacts in a plane are solved at once, which
+finds all solutions, also none or several (Painleve). With more contacts, and in space, where directions of slip are unknowns,
+Lemke's method gives the modes, in space with a cone of FACETS, which are then put right for the round one; combinations are tried
+one after the other only where that fails.
 
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapters 5, 8 (impacts: Newton's and Poisson's
 law); Glocker, Set-Valued Force Laws, 2001; Stewart and Trinkle, An implicit time-stepping scheme for rigid body dynamics with
@@ -82,7 +82,7 @@ class Site:
 
 @dataclass(frozen=True)
 class Mode:
-    """What one contact does: OPEN, STICKING or SLIDING, the direction of its slip, whether its normal row holds.
+    """State of one contact: OPEN, STICKING or SLIDING, the direction of its slip, whether its normal row holds.
 
     kept   whether it has the friction of SLIDING, but other contacts keep it from slipping; the direction is then longer than a
            unit vector, so that kinetic friction times that is static friction, or zero where nothing presses it
@@ -111,8 +111,8 @@ class Solved:
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
     """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS in a plane.
 
-    What static friction can hold does not begin to slide: kinetic friction, where it is less, counts for what slides then. A
-    contact that others keep from slipping while its own friction is at its bound has static friction, see Mode.kept.
+    A contact that static friction can hold does not begin to slide: kinetic friction, where it is less, counts for what slides
+    then. A contact that others keep from slipping while its own friction is at its bound has static friction, see Mode.kept.
     """
     return _with_static_friction(D, b, sites, ())
 

@@ -47,7 +47,7 @@ def _contacts(module: Module) -> tuple[ContactRecord | CompliantRecord, ...]:
 
 
 def _name(contact: ContactRecord | CompliantRecord) -> str:
-    """What the user calls it, of a box for all its corners."""
+    """Name that the user gave, one for all corners of a box."""
     return contact.contact if isinstance(contact, ContactRecord) else contact.name
 
 

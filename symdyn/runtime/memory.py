@@ -1,4 +1,4 @@
-"""What a request would take of the machine's memory, looked at before any is taken; arrays that libraries share."""
+"""Memory that a request would take, checked before any is taken; arrays that libraries share."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from symdyn.errors import ArgumentError
 
 DOUBLE = 8
-# Of addresses, bytes: arrays of JAX begin at multiples of it.
+# Alignment of addresses, bytes: arrays of JAX begin at multiples of it.
 ALIGNMENT = 64
 # Where a container's limit stands (versions 2 and 1 of Linux control groups), and what it has used.
 _GROUPS = (("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
                               | Named[InputValue] | Numbers)
     # Numbers of many motions, also in arrays of other libraries on a GPU.
     OfMany: TypeAlias = Values | OnDevice | Named[OnDevice] | Named[float | Row | OnDevice]
-    # Of coordinates by name or symbol: least and most, or r for (-r, r).
+    # Bounds of coordinates by name or symbol: least and greatest, or r for (-r, r).
     Ranges: TypeAlias = Named[float] | Named[tuple[float, float]] | Named[float | tuple[float, float]]
     # A state: in order, by name or symbol, as (q, u), or with all that belongs to it.
     Start: TypeAlias = Values | tuple[Row, Row] | Equilibrium | Solution
@@ -92,7 +92,7 @@ class FurtherDerivatives(NamedTuple):
 
 
 _BY = "x, inputs, params, t and ud"
-# By what weighted sums of rates are differentiated, once or twice.
+# Quantities by which weighted sums of rates are differentiated, once or twice.
 _WEIGHTED = ("x", "inputs", "params", "t")
 
 
@@ -196,8 +196,8 @@ class Module:
 
     @property
     def batch_width(self) -> int:
-        """How many states one processor core computes at once in `rhs_batch` and `simulate_batch`; 1: the backend is NumPy, or
-        the C compiler has no vectors.
+        """Number of states that one processor core computes at once in `rhs_batch` and `simulate_batch`; 1: the backend is NumPy,
+        or the C compiler has no vectors.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.batch_width
@@ -524,7 +524,7 @@ class Module:
                                 f"{', '.join(_WEIGHTED)}")
 
     def _with_weights(self, weights: Any, along: Any, n: int) -> np.ndarray:
-        """What weighted functions take in place of accelerations: zeros for these, weights, a direction."""
+        """Arguments of weighted functions in place of accelerations: zeros for these, weights, a direction."""
         rows = []
         for what, value, size in (("weights", weights, self.metadata.sizes.x), ("along", along, n)):
             numbers = real_of(value, self.name, f"{what} must be numbers")
@@ -593,7 +593,7 @@ class Module:
         return result(name)
 
     def _derivatives(self, of: Any) -> dict[str, str]:
-        """By what a function is differentiated -> the name of the function that does."""
+        """Quantities by which a function is differentiated -> the name of the derivative's function."""
         text(of, f"{self.name}: the name of the function to differentiate", "inverse_dynamics")
         self._library(of)
         own = {f"{by}": f"jacobian_{by}" for by in ("x", "inputs", "params") if of == "rhs"}
@@ -1294,7 +1294,7 @@ class Module:
         return known
 
     def _initial(self, group: str) -> np.ndarray:
-        """What entries of a group are where they are left out: their initial values in the system, else 0."""
+        """Values of entries of a group that are left out: their initial values in the system, else 0."""
         return np.array(list(self.metadata.initial_values(group).values()))
 
     def _state(self, q: Any, u: Any = None) -> np.ndarray:
@@ -1411,7 +1411,8 @@ def demand_module(given: Any, who: str) -> None:
 
 
 def _mark(params: Any) -> Any:
-    """What shows that parameters were changed in place: their numbers, also of what holds a number that may change."""
+    """Mark by which parameters changed in place are detected: their numbers, also those of objects that hold a number that may
+    change."""
     if params is None:
         return None
     if type(params) is np.ndarray and not params.dtype.hasobject:

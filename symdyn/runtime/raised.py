@@ -56,7 +56,7 @@ class Location(NamedTuple):
 
 
 def location_of(error: BaseException) -> Location | None:
-    """Of what the text of a user's function raised in a generated module; None: of anything else."""
+    """Location of an error that the text of a user's function raised in a generated module; None: of anything else."""
     frames = _frames(error)
     for (frame, _), (inner, line) in itertools.pairwise(frames):
         file, code = frame.f_code.co_filename, inner.f_code

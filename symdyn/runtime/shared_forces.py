@@ -1,4 +1,4 @@
-"""How contacts that stick share forces which the motion does not determine: a box on four corners, a table on legs.
+"""Shares of sticking contacts in forces that the motion does not determine: a box on four corners, a table on legs.
 
 Accelerations determine the forces lam of contacts up to a null space. Contacts hold as long as some forces of that space are
 within all cones of friction. Those with the largest margin s are a second-order cone program,
@@ -38,7 +38,7 @@ WORTH, ROUNDS, SMALLEST = 1e-3, 3, 1e-9
 PRESTRESS = 10.0
 
 
-# Of u_0^2 - |u_T|^2.
+# Signs of u_0^2 - |u_T|^2.
 SIGNS = np.array([1.0, -1.0, -1.0])
 
 
@@ -139,7 +139,7 @@ def _by_parts(softness: np.ndarray, N: np.ndarray) -> np.ndarray:
 def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
     """y and s of the largest margin by sizes f, and the softness of all rows."""
     n, normals = null.N.shape[1], [cone.normal for cone in cones if cone.normal is not None]
-    # Of each cone u = [mu lam_N - s f; lam_T] = u_0 + W v.
+    # Each cone has u = [mu lam_N - s f; lam_T] = u_0 + W v.
     parts = _Parts(np.zeros((len(cones) + 1, 3)), np.zeros((len(cones) + 1, 3, n + 1)))
     for k, cone in enumerate(cones):
         rows = list(cone.tangents)
@@ -155,7 +155,7 @@ def _largest_margin(null: _Null, cones: Sequence[Cone], sizes: np.ndarray) -> tu
     while weight < LAST:
         weight = min(LAST, weight * LOWERED)
         v = _centred(parts, v, weight)
-    # Of each cone the part of the margin that it is worth, and this by the tangential force: softness, up to a factor.
+    # Part of the margin that each cone is worth, and its derivative by the tangential force: softness, up to a factor.
     u = parts.at(v)
     worth = 2 * u[:, 0] / (weight * (u**2 @ SIGNS))
     by_force = worth / u[:, 0]

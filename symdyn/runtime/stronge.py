@@ -1,8 +1,8 @@
 """Impact of one contact with friction and Stronge's energetic restitution, by Routh's method.
 
 The normal impulse p goes on from zero, and the velocities change with it as with forces: v' = D [1, f], where the friction f is
--mu against the slip, or what holds the contact without slip. Of the work that compression takes, the integral of v_N over p while
-v_N < 0, expansion gives back the part e^2.
+-mu against the slip, or what holds the contact without slip. Expansion gives back, of the work that compression takes, the
+integral of v_N over p while v_N < 0, the part e^2.
 
 In a plane each piece is a straight line in p. In space the direction phi of the slip turns as it goes on. With dp = |s| dsigma
 

@@ -19,7 +19,7 @@ def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[st
 
     values    None for the defaults; an array, with the trajectories along the first axis if it has two; or a mapping from
               names or symbols to numbers or to arrays (n,)
-    Raises ArgumentError for what does not fit. What varies may be NaN: that is a fault of one trajectory alone.
+    Raises ArgumentError for what does not fit. A value that varies may be NaN, which is a fault of one trajectory alone.
     """
     if not isinstance(values, Mapping):
         array = real_of(values if values is not None else 0.0, owner, f"{what} must be real numbers")
@@ -63,7 +63,7 @@ def side_by_side(groups: Sequence[np.ndarray], n: int) -> np.ndarray:
 
 
 def together(tables: Mapping[str, np.ndarray], owner: str) -> int:
-    """How many trajectories there are: what has one row holds for all. Raises ArgumentError where the numbers differ."""
+    """Number of trajectories; a table with one row holds for all. Raises ArgumentError where the numbers differ."""
     lengths = {what: len(rows) for what, rows in tables.items() if len(rows) != 1}
     if len(set(lengths.values())) > 1:
         raise ArgumentError(f"{owner}: {', '.join(f'{what} has {n} rows' for what, n in lengths.items())}; give what varies the "

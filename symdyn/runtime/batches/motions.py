@@ -157,7 +157,7 @@ def why_one_by_one(module: Module) -> str:
 
 
 def many_at_once(module: Module, built: bool) -> str:
-    """How many states and motions are computed at once; built: whether the code for it is there."""
+    """Words for how many states and motions are computed at once; built: whether the code for it is there."""
     if module.backend != "c":
         return f"rhs_batch by broadcasting, simulate_batch {why_one_by_one(module)}"
     lanes = "as many as the processor's vectors have lanes (module.batch_width)"
@@ -179,7 +179,7 @@ def why_columns_one_by_one(module: Module, look: np.ndarray, n: int) -> str:
     metadata = module.metadata
     if not n:
         return ""
-    # How a run of its own warns of sensitivities needs its steps there, or its events.
+    # A run of its own needs its steps or its events there to warn of sensitivities.
     if metadata.switches:
         return "one by one: with sensitivities, of a right-hand side that may jump"
     if any(event.reset for event, sought in zip(metadata.events, look, strict=True) if sought):
@@ -192,7 +192,7 @@ def why_columns_one_by_one(module: Module, look: np.ndarray, n: int) -> str:
 
 
 def unit_of(method: str, looks: bool, sensitivities: tuple[str, ...] = ()) -> str | RightSide:
-    """What the code of motions in lanes is made for; looks: for events."""
+    """Name or right-hand side for which the code of motions in lanes is made; looks: for events."""
     plain = method == METHOD and not looks and not sensitivities
     return LIBRARY if plain else RightSide(method=method, lanes=True, looks=looks, sensitivities=sensitivities)
 

@@ -67,7 +67,7 @@ def on_device(module: Module, asked: Asked, number: int, options: Mapping[str, A
 
 
 def _numbers(module: Module, asked: Asked, motions: Together, precision: str) -> dict[int, tuple[int, int]]:
-    """What the kernel reads of arrays on the device: where it was not replaced when it was checked."""
+    """Addresses and strides of arrays on the device that the kernel reads, unless a check has replaced them."""
     if asked.there is None:
         return {}
     same = {"x": np.array_equal(motions.starts, asked.starts, equal_nan=True), "inputs": asked.along is None,

@@ -40,7 +40,7 @@ class Columns:
     @classmethod
     def of(cls, module: Module, given: Any, params: np.ndarray, inputs: np.ndarray, along: Inputs | None,
            controlled: bool) -> Columns:
-        """What is asked for; parameters (n, n_p), constant inputs (n, n_in), or one row of each; along: inputs over time.
+        """Requested columns; parameters (n, n_p), constant inputs (n, n_in), or one row of each; along: inputs over time.
 
         Raises ArgumentError with all that does not fit.
         """
@@ -126,7 +126,7 @@ def _behind(columns: Columns, rows: np.ndarray) -> np.ndarray:
 
 
 def _affected(module: Module, name: str, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Of every pair of rows, whether the right-hand side changes there with a parameter or an input, for sure."""
+    """Mask of the pairs of rows where the right-hand side certainly changes with a parameter or an input."""
     metadata = module.metadata
 
     def rates(p: np.ndarray, given: np.ndarray) -> np.ndarray:

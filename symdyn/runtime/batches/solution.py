@@ -1,4 +1,4 @@
-"""What many trajectories have come to."""
+"""Results of many trajectories."""
 
 from __future__ import annotations
 

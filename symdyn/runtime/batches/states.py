@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 LIBRARY = "rhs_batch"
-# Of so many rows a warning says the numbers.
+# A warning lists the numbers of at most so many rows.
 LISTED = 8
 
 
@@ -40,7 +40,7 @@ def tables_of(arrays: list[np.ndarray]) -> Any:
 
 
 def width(module: Module) -> int:
-    """How many states are computed at once on one processor core."""
+    """Number of states computed at once on one processor core."""
     library: Any = module.library(LIBRARY) if module.backend == "c" else None
     return 1 if library is None else int(library.function("batch_width")())
 
@@ -85,7 +85,7 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
 
 
 def _rows(module: Module, values: Mapping[str, Any]) -> tuple[int, dict[str, np.ndarray]]:
-    """How many states there are, and the rows of t, x, inputs and params."""
+    """Number of states, and the rows of t, x, inputs and params."""
     t, x = values["t"], values["x"]
     states, times = _numbers(module, x, "x"), _numbers(module, t, "t")
     n_x = module.metadata.sizes.x

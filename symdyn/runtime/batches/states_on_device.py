@@ -64,7 +64,7 @@ def _there(module: Module, device: Device, kernels: Kernels, library: Any, value
         views["t"] = View(t.address, (*t.shape, 1), (*t.strides, 1), t.kept)
     for group, result in views.items():
         demand_rows(result, widths[group], name, group)
-    # What is here is taken with a state in the place of those that are there.
+    # Values on the host are taken together with a state that stands for those on the device.
     rows, arrays = take({g: np.zeros((1, widths[g])) if g in ("x", "inputs", "params") and g in there else
                          0.0 if g in there else values[g] for g in GROUPS})
     n = max(rows, *(v.shape[0] for v in views.values()))

@@ -110,7 +110,7 @@ class Together:
 
     def solution(self, library: Any, width: int, note: str, interrupted: bool, limit: int,
                  alone: Callable[[np.ndarray], BatchSolution]) -> BatchSolution:
-        """What has come of them; those that took more than `limit` steps, or left their constraints, are integrated alone.
+        """Solution of the motions; those that took more than `limit` steps, or left their constraints, are integrated alone.
 
         Raises SimulationInterrupted where that was interrupted.
         """
@@ -135,7 +135,7 @@ class Together:
         if doubtful.any() and not interrupted:
             note = f"{doubtful.sum()} of {n} motions one by one: quantities of their events vary too quickly to be resolved"
         late |= doubtful
-        # What keeps a state from the constraints, or fails at an event, a run of its own finds out.
+        # A run of its own finds out what keeps a state from the constraints, or fails at an event.
         if projects(module) or self.asked.looks or columns is not None:
             late |= ~success
         if columns is not None:
@@ -181,7 +181,7 @@ class Together:
 
 
     def _rows(self) -> np.ndarray:
-        """What is known of every motion, (n, n_t, n_x): where only its end is kept, the start, too."""
+        """Known states of every motion, (n, n_t, n_x): where only its end is kept, the start, too."""
         if isinstance(self.x, np.ndarray) and self.x.shape[1] > 1:
             return self.x
         starts = np.broadcast_to(self.starts, (self.asked.n, self.starts.shape[1]))

@@ -93,7 +93,7 @@ def _target(source: str, stem: str, compiler: Compiler) -> Path:
 def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> None:
     """Compile in a folder of its own and move the finished library to its name in one step.
 
-    Whoever sees the name sees a whole library, whatever happens to this process or to others at this work.
+    The name stands for a complete library, whatever happens to this process or to others that compile it.
     """
     cache = target.parent
     _sweep(cache)
@@ -101,7 +101,7 @@ def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> No
         text, library = Path(folder, target.stem + ".c"), Path(folder, target.name)
         text.write_text(source, encoding="utf-8", newline="\n")
         fault, output = "", ""
-        # What several units cannot be made of is compiled as one, whose messages are those to show.
+        # Source that cannot be compiled as several units is compiled as one, whose messages are those to show.
         if not built_from_units(source, library, compiler, cache):
             fault, output = run(_command(compiler, text, library), cache)
             if not fault and not library.is_file():
@@ -122,7 +122,8 @@ def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> No
             if not is_whole(target):
                 raise
             return
-        # Whoever looks before the digest is there takes the library for a damaged one and builds it, too: time is lost, no more.
+        # A process that looks before the digest is there takes the library for a damaged one and builds it, too, which only costs
+        # time.
         write_whole(seal_of(target), lambda file: file.write(sealed), PRIVATE, sync=False)
 
 

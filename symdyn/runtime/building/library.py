@@ -324,13 +324,13 @@ class PythonEvaluator:
 
 
 def check_parameters(metadata: Metadata, p: Sequence[float] | np.ndarray) -> str:
-    """What to do where what depends on parameters only cannot be computed; those that are 0 are the first to look at."""
+    """Advice where expressions of parameters alone cannot be computed: check first the parameters that are 0."""
     zero = [name for name, value in zip(metadata.parameters, p, strict=False) if value == 0]
     return "check the parameters" + (f", of which {', '.join(zero)} {'are' if len(zero) > 1 else 'is'} 0" if zero else "")
 
 
 def _rows(arrays: Sequence[np.ndarray]) -> int:
-    """How many states there are: one row holds for all, and no row is no state."""
+    """Number of states: one row holds for all, and no row is no state."""
     lengths = [len(a) for a in arrays]
     return 0 if 0 in lengths else max(lengths)
 

@@ -21,7 +21,7 @@ from symdyn.runtime.building.compiler import Compiler, flags, link_flags
 from symdyn.runtime.building.stored import PRIVATE, digest, write_whole, writers
 from symdyn.translation_units import TranslationUnit, translation_units
 
-# How often compilers that run are looked at, s.
+# Interval at which running compilers are checked, s.
 _POLL = 0.002
 # Compilers that write object files with -c, and start quickly.
 _WITH_OBJECTS = ("gcc", "clang")

@@ -85,7 +85,7 @@ class _Memory:
         return record if result else None
 
     def _write(self) -> None:
-        """Whoever reads sees a whole record; if the disk is full there is none, and the next run derives again."""
+        """A reader sees a complete record; if the disk is full there is none, and the next run derives again."""
         with contextlib.suppress(OSError):
             record = {"state": self.state, "metadata": self.metadata.as_plain(), "units": self.texts.as_plain()}
             write_sealed(self.path, json.dumps(record).encode())

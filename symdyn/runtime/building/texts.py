@@ -49,7 +49,7 @@ class Texts:
         return {key: {"source": text, "metadata": metadata.as_plain()} for key, (text, metadata) in self._made.items()}
 
     def _key(self, what: str | RightSide) -> str:
-        """Of the text with a function; other right-hand sides than the plain one have a "rhs" of their own."""
+        """Key of the text with a function; other right-hand sides than the plain one have a "rhs" of their own."""
         plain_side = key_of(RightSide())
         with_it = (key for key, (_, metadata) in self._made.items()
                    if what in metadata.shapes and (key == plain_side or not key.startswith("{")) and key != BATCH)

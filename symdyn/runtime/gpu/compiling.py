@@ -37,7 +37,7 @@ def ptx(text: str, name: str, architecture: str) -> tuple[bytes, str]:
 
 
 def report(text: str, name: str, architecture: str) -> str:
-    """What the compiler says of registers and memory of a kernel on an architecture such as "sm_90". Raises as `ptx` does."""
+    """Report of the compiler on registers and memory of a kernel on an architecture such as "sm_90". Raises as `ptx` does."""
     return _compiled(text, name, architecture, "CUBIN", "--ptxas-options=-v")[1]
 
 
@@ -80,7 +80,7 @@ def _compiled(text: str, name: str, architecture: str, form: str, *more: str) ->
 
 
 def _taken(size: Any, get: Any, program: Any) -> bytes:
-    """What two functions of the compiler give: a length, then so many bytes."""
+    """Bytes that two functions of the compiler give: the first their number, the second the bytes."""
     _, length = size(program)
     result = b" " * length  # the compiler writes into it
     get(program, result)

@@ -17,7 +17,7 @@ BLOCK = 128
 
 
 class OfDevice(SymdynError):
-    """What a device lacks or does not do, whatever the motions are; the base of the two below."""
+    """Missing ability of a device, whatever the motions are; the base of the two below."""
 
 
 class NoDevice(OfDevice, ArgumentError):
@@ -29,7 +29,8 @@ class DeviceFailed(OfDevice, EvaluationError):
 
 
 class Device(Protocol):
-    """What runs kernels. Addresses are numbers; copies and kernels of one stream follow each other, those of two do not wait."""
+    """Device that runs kernels. Addresses are numbers; copies and kernels of one stream follow each other, those of two do not
+    wait."""
 
     name: str
     # As DLPack has them: its type and number.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CPU, CUDA = 1, 2
 _FLOAT = 2
 _NAME = b"dltensor"
-# What arrays of CUDA have without DLPack, and how that calls the default stream.
+# Attribute of CUDA arrays without DLPack, and its number for the default stream.
 _INTERFACE, LEGACY = "__cuda_array_interface__", 1
 
 

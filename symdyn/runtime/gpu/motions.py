@@ -18,23 +18,23 @@ from symdyn.runtime.gpu.turns import in_turns, parts_of
 from symdyn.runtime.inputs.tables import Pieces
 from symdyn.runtime.memory import in_bytes
 
-# Of the memory that is free so much is taken, by two chunks at a time.
+# Share of the free memory that two chunks take at a time.
 SHARE, SLOTS = 0.8, 2
 # A chunk has so many motions for every thread that the device holds, unless all of them are fewer, so that threads that are
 # through find a further motion.
 ROUNDS = 4
-# Attempted steps of a motion, at most: a kernel cannot be interrupted. What takes more goes on on the processor.
+# Attempted steps of a motion, at most: a kernel cannot be interrupted. Motions that take more go on on the processor.
 MOST_STEPS = 1_000_000
 ALIGNED = 256
 # Threads that attempt their steps together. Where there are more, and all motions have been taken, those under way are put down
 # after so many attempts and gathered in as few warps; every time they take a quarter more attempts, and the last time any number.
-# What is put down takes no more than this share of the memory that is free.
+# Stored values take no more than this share of the free memory.
 WARP = 32
 TURN, TURNS, SHARE_PUT = 32, 64, 0.1
 
 
 class Motions(ctypes.Structure):
-    """What a kernel computes motions from and where it writes them; see c/runtime/motions_type.h."""
+    """Arguments of a kernel that computes motions, and addresses of its results; see c/runtime/motions_type.h."""
 
     _fields_ = fields_of("runtime/motions_type.h")
 
@@ -79,7 +79,7 @@ class Work:
 
     @functools.cached_property
     def given(self) -> tuple[tuple[list[int], np.ndarray], ...]:
-        """What is brought to the device: places of numbers in the order of the kernel, and rows of them, or one for all."""
+        """Values copied to the device: indices of numbers in the order of the kernel, and rows of them, or one for all."""
         result: list[tuple[list[int], np.ndarray]] = []
         first = 0
         for rows in (self.starts, self.inputs, self.params, self.lengths):
@@ -93,11 +93,11 @@ class Work:
 
     @property
     def results(self) -> tuple[np.ndarray, ...]:
-        """What is copied back."""
+        """Arrays copied back."""
         return *((self.x,) if isinstance(self.x, np.ndarray) else ()), self.states, self.reports, self.doubts
 
     def bytes_each(self) -> int:
-        """What one motion takes of the device's memory."""
+        """Device memory of one motion, bytes."""
         varying = sum(a.shape[1] * self.dtype.itemsize for _, a in self.given if len(a) > 1)
         return varying + sum(a[:1].nbytes for a in self.results)
 

@@ -25,7 +25,7 @@ PART = 2**20
 
 
 class StateRows(ctypes.Structure):
-    """What a kernel computes right-hand sides from and where it writes them; see c/runtime/states_type.h."""
+    """Arguments of a kernel that computes right-hand sides, and addresses of its results; see c/runtime/states_type.h."""
 
     _fields_ = fields_of("runtime/states_type.h")
 

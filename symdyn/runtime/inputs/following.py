@@ -58,7 +58,7 @@ class Followed:
 
     @property
     def places(self) -> list[int]:
-        """Of value, rate and acceleration."""
+        """Indices of value, rate and acceleration."""
         return [self.place, self.place + 1, self.place + 2]
 
     def at(self, t: float, x: np.ndarray = NO_STATE) -> np.ndarray:
@@ -250,7 +250,8 @@ def _takes_time_alone(function: Callable[..., Any]) -> bool:
 
 def _demand_motion(motion: Followed, where: str, span: tuple[float, float]) -> None:
     """Raises ArgumentError where the second of the three is not the rate of the first, or the third not that of the second, and
-    where the value or the rate jumps, as far as instants within a run show it. What the function raises is left to the run."""
+    where the value or the rate jumps, as far as instants within a run show it. Errors that the function raises are left to the
+    run."""
     begin, length = min(span), abs(span[1] - span[0])
     # Evenly spread, though off the round times at which motions are composed of pieces.
     instants = begin + length * (np.arange(INSTANTS) + 0.5 * np.sqrt(np.arange(INSTANTS) % 7 / 7 + 0.1)) / INSTANTS

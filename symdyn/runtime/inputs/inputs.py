@@ -140,7 +140,7 @@ class Inputs:
 
     @property
     def by_tables(self) -> bool:
-        """Whether tables and numbers are all that they are given by."""
+        """Whether tables and numbers give all of them."""
         return self.pieces is not None and self.function is None and not self.samplers
 
     @property
@@ -181,7 +181,7 @@ class Inputs:
 
     @property
     def places(self) -> list[int]:
-        """Of the inputs that controllers set."""
+        """Indices of the inputs that controllers set."""
         return sorted({index for sampler in self.samplers for index in sampler.places} if self.record is None
                       else self.record.places)
 
@@ -208,7 +208,7 @@ class Inputs:
         return values if self.record is None else self.record.put(t, values)
 
     def left_out(self, t: Any) -> np.ndarray:
-        """What inputs that are left out are in a run, (n_in,), or (n, n_in) for times (n,): motions alone depend on the time."""
+        """Values in a run of inputs that are left out, (n_in,), or (n, n_in) for times (n,): motions alone depend on the time."""
         return self.constant if self.motions is None else self.motions.at(t)
 
     def _without_record(self, t: float, x: np.ndarray) -> np.ndarray:

@@ -134,7 +134,7 @@ class Record:
         return result
 
     def of(self, index: int) -> SampleRows:
-        """What was set of one input."""
+        """Values that were set of one input."""
         when = self.fresh[:, index]
         return SampleRows(self.times[when], self.values[when, index])
 
@@ -214,7 +214,7 @@ class Sampling:
 
     @property
     def record(self) -> Record:
-        """What was held so far."""
+        """Values held so far."""
         return Record(np.array(self._times), np.array(self._values).reshape(-1, len(self.held)),
                       np.array(self._fresh).reshape(-1, len(self.held)),
                       tuple(sorted({index for sampler in self.samplers for index in sampler.places})),

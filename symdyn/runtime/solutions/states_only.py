@@ -22,7 +22,7 @@ NOT_KEPT = ("nfev", "njev", "nlu", "seconds", "integrator_seconds", "doubts", "c
 class StatesOnly(Solution):
     """A motion with its states at output times, steps, parameters and inputs, and all that is computed from these.
 
-    What else a run of its own would know raises ArgumentError: see NOT_KEPT; states at other times do so already.
+    Other results of a run of its own raise ArgumentError: see NOT_KEPT; states at other times do so already.
     """
 
     def __init__(self, module: Module, t: np.ndarray, x: np.ndarray, steps: tuple[int, int], params: np.ndarray,

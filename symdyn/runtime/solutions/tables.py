@@ -1,4 +1,4 @@
-"""What a report of one run shows in tables: facts, parameters, start, extremes, energy, constraints, what loads look at."""
+"""Tables in a report of one run: facts, parameters, start, extremes, energy, constraints, what loads look at."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def energy(solution: Solution) -> Energy | None:
 
 
 def constraints(solution: Solution) -> list[dict[str, str]]:
-    """How well every constraint is kept: its largest residual, relative to the mechanism's length, and of its rate."""
+    """Quality of every constraint: its largest residual, relative to the mechanism's length, and of its rate."""
     names = solution.module.metadata.constraints
     if not names or not len(solution.t):
         return []
