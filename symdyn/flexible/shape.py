@@ -154,7 +154,7 @@ class Basis:
 
     @property
     def degree(self) -> int:
-        """Of the polynomials between the breaks."""
+        """Degree of the polynomials between the breaks."""
         return max([curve.c.shape[0] - 1 for _, _, curve, _ in self._parts], default=0)
 
     def __call__(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:

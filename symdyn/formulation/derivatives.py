@@ -20,9 +20,9 @@ from symdyn.tape.node import ACCELERATION, Node
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable, unsigned
 
-# By what functions are differentiated -> the groups of arguments that this is.
+# Names of what functions are differentiated by -> the groups of arguments with this name.
 BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
-# By what a weighted sum of the rates is differentiated, once or twice.
+# Names of what a weighted sum of the rates is differentiated by, once or twice.
 WEIGHTED = ("x", "inputs", "params", "t")
 # Other quantities that are weighted and differentiated twice.
 CURVED = ("constraints", "outputs")
@@ -96,7 +96,8 @@ def gradient(equations: Equations, wrt: Sequence[str], along: str | None = None)
 
 
 def second_named(name: str) -> tuple[str, tuple[str, ...]] | None:
-    """What a function of weighted rates is, and by what it differentiates: adjoint_x, hessian_x_inputs, hessian_product_x."""
+    """Kind of a function of weighted rates, and the groups by which it differentiates: adjoint_x, hessian_x_inputs,
+    hessian_product_x."""
     for kind in ("hessian_product", "hessian", "adjoint"):
         wrt = tuple(name.removeprefix(f"{kind}_").split("_"))
         if name.startswith(f"{kind}_") and wrt == tuple(by for by in WEIGHTED if by in wrt):
@@ -139,8 +140,8 @@ def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
 
 
 def curvature_named(name: str) -> tuple[str, tuple[str, ...]] | None:
-    """What a function of this name differentiates twice, weighted, and by what: constraints_hessian_x_params,
-    outputs_hessian_x_inputs; None for other functions."""
+    """Weighted quantity that a function of this name differentiates twice, and the groups by which it does:
+    constraints_hessian_x_params, outputs_hessian_x_inputs; None for other functions."""
     of, result, by = name.partition("_hessian_")
     wrt = tuple(by.split("_"))
     return (of, wrt) if result and of in CURVED and wrt == tuple(one for one in WEIGHTED if one in wrt) else None

@@ -232,7 +232,7 @@ class Equations(EquationsFacade):
         return self._printed[key]
 
     def _vanishing(self) -> list[Any]:
-        """What is zero where the constraints hold: C, its rate, the norm of Euler parameters less one."""
+        """Quantities that are zero where the constraints hold: C, its rate, the norm of Euler parameters less one."""
         if not self.constraints:
             raise ArgumentError(f"{self.name} ({self.formulation}) has no constraints that a quantity could be written on; leave "
                                 "out on_constraints")

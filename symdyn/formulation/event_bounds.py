@@ -19,12 +19,12 @@ from symdyn.tape.tape import Tape, reachable
 BOUNDS, RANGES = "event_bounds", "event_ranges"
 # Functions that can make no pulse far narrower than their argument's own changes.
 _EVEN = (sp.sin, sp.cos, sp.sinh, sp.cosh, sp.asinh, sp.log)
-# Of a leaf, in the order of its bounds: value, derivative and second derivative by the place within the part, from and to.
+# Bounds of a leaf in their order: value, derivative and second derivative by the place within the part, from and to.
 _ENDS = ("least", "most", "least rate", "most rate", "least bend", "most bend")
 
 
 def enclosed(equations: Equations) -> list[bool]:
-    """Which events can be enclosed."""
+    """Mask of the events that can be enclosed."""
     if not equations.events:
         return []
     ways = [equations] if equations.singular_fallback is None else [equations, equations.singular_fallback]
@@ -32,7 +32,7 @@ def enclosed(equations: Equations) -> list[bool]:
 
 
 def unproved(equations: Equations) -> list[str]:
-    """Of every event that is not enclosed, but has functions in its expression that can make narrow pulses, which; else ""."""
+    """Functions that can make narrow pulses in the expression of every event that is not enclosed; else ""."""
     parameters = set(equations.symbols.parameters)
     return ["" if can else _steep(event.value, parameters)
             for can, event in zip(enclosed(equations), equations.events, strict=True)]
@@ -90,8 +90,8 @@ def event_bounds(equations: Equations, name: str) -> Tape:
 
 
 def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
-    """Of every event the inputs and the functions of the user that its value depends on, but for those in equations that are
-    solved for it."""
+    """Inputs and functions of the user that the value of every event depends on, but for those in equations that are solved for
+    it."""
     if not equations.events:
         return []
     recorder, values = equations.recorder, equations.quantity("events")

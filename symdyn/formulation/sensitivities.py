@@ -1,7 +1,7 @@
 """Quantities from which sensitivities of a motion are integrated: derivatives along a direction of what a run evaluates.
 
-The direction is an argument, the leaves of `direction`: changes of [q; u; z; inputs; parameters]. What takes the place of these
-leaves (see symdyn.functions.sensitivities) decides how many columns there are, and of which sensitivities.
+The direction is an argument, the leaves of `direction`: changes of [q; u; z; inputs; parameters]. The values that take the place
+of these leaves (see symdyn.functions.sensitivities) decide how many columns there are, and of which sensitivities.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class External:
     reason       what it means where the function fails or a result is not finite; there a simulation stops and reports it
     operations   about how many operations it takes: what counts of it in reports and choices
 
-    Of a Piecewise all parts are computed, so that a function must not fail where another part holds.
+    All parts of a Piecewise are computed, so that a function must not fail where another part holds.
     Raises ModelError that lists every fault.
 
     >>> text = "static int square(const double *in, double *out) { out[0] = in[0]*in[0]; return 0; }"

@@ -24,8 +24,8 @@ CARRIER = "carrier"
 def with_carriers(system: System) -> System:
     """The system with every Helical and Custom joint that closes a loop taken apart.
 
-    What such a joint leaves free cannot be found from the pose of its two bodies alone (a screw after several turns), so its
-    coordinates become coordinates of the system: the joint carries a massless body, which is fixed to the child.
+    The coordinates of such a joint do not follow from the pose of its two bodies alone (a screw after several turns), so they
+    become coordinates of the system: the joint carries a massless body, which is fixed to the child.
     """
     screws = [j for j in system.loops if isinstance(j, (Helical, Custom))]
     if not screws:

@@ -541,7 +541,7 @@ class System(SystemFacade):
         return check(self)
 
     def _of_sympy(self, demanded: Callable[[Any, str], Any], given: Any, what: str) -> Any:
-        """What was given as `demanded` takes it, a ReferenceFrame or a Point, or None."""
+        """The given ReferenceFrame or Point, read by `demanded`, or None."""
         try:
             return demanded(given, what)
         except ModelError as error:
@@ -553,7 +553,7 @@ class System(SystemFacade):
         return next((b for b in (self.ground, *self.bodies) if isinstance(body, str) and body == b.name), body)
 
     def _written_in(self, value: Any, frame: Any, label: str) -> tuple[Any, Any]:
-        """In whose axes a load is given, None for the n-frame, and the body that has them, by the frame that a SymPy vector is
+        """Axes in which a load is given, None for the n-frame, and the body that has them, by the frame that a SymPy vector is
         written in."""
         if not is_sympy_vector(value) or len(frames_of(value)) != 1:
             return frame, self.ground

@@ -54,16 +54,16 @@ class Arrays:
 
     @cached_property
     def running(self) -> np.ndarray:
-        """Whether each step must be evaluated at every state, since it depends on more than parameters, (n,)."""
+        """Mask of the steps that must be evaluated at every state: those that depend on more than parameters, (n,)."""
         return (self.masks & ~PARAMETER != 0) & ~self.does(*_READ)
 
     @cached_property
     def prologue(self) -> np.ndarray:
-        """Whether each step depends on parameters only, (n,)."""
+        """Mask of the steps that depend on parameters only, (n,)."""
         return (self.masks == PARAMETER) & ~self.does(*_READ)
 
     def does(self, *ops: str) -> np.ndarray:
-        """Whether each step is one of these operations, (n,)."""
+        """Mask of the steps with one of these operations, (n,)."""
         return np.isin(self.ops, [_NUMBERS[op] for op in ops])
 
     def indices(self, values: Iterable[Any]) -> np.ndarray:
@@ -76,7 +76,7 @@ class Arrays:
         return int(self._indices[min(node.index, len(self._indices) - 1)])
 
     def marked(self, values: Iterable[Any]) -> np.ndarray:
-        """Whether each step is among the values, (n,)."""
+        """Mask of the steps among the values, (n,)."""
         result = np.zeros(len(self.steps) + 1, dtype=bool)
         result[self.indices(values)] = True
         return result[:-1]
@@ -86,6 +86,6 @@ class Arrays:
         return tuple(compress(self.steps, which.tolist()))
 
     def read_by(self, which: np.ndarray) -> np.ndarray:
-        """The number of times that each step is read, with or without a sign, by the steps that are marked, (n,)."""
+        """Number of times that the marked steps read each step, with or without a sign, (n,)."""
         cores = self.cores[which[self.readers]]
         return np.bincount(cores[cores >= 0], minlength=len(self.steps))

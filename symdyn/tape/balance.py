@@ -174,12 +174,12 @@ class _Balancer:
 
 
 def _free_sums(tape: Tape) -> np.ndarray:
-    """Whether each step is a sum whose terms may be taken in any order, (n,)."""
+    """Mask of the steps that are sums whose terms may be taken in any order, (n,)."""
     return tape.arrays.does(*_SUMS) & (tape.arrays.masks & ~PARAMETER != 0)
 
 
 def _inner_sums(tape: Tape) -> np.ndarray:
-    """Whether each step is a sum that is used once, by another sum, and has neither a name nor a check: its order is free."""
+    """Mask of the sums that are used once, by another sum, and have neither a name nor a check: their order is free, (n,)."""
     arrays, free = tape.arrays, _free_sums(tape)
     results = [unsigned(e) for o in tape.outputs.values() for e in o.entries]
     kept = arrays.marked([*tape.recorder.names, *tape.recorder.checks, *results])

@@ -1,4 +1,4 @@
-"""The number of cycles that a processor takes for a tape: an estimate from the steps alone, the same on every machine.
+"""Number of cycles that a processor takes for a tape: an estimate from the steps alone, the same on every machine.
 
 The processor is a model of current ones: in a cycle it begins at most WIDTH instructions of the tape, each as soon as what
 it needs is there, and it looks no more than WINDOW instructions beyond the oldest that is not finished. This comes to

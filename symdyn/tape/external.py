@@ -19,7 +19,7 @@ from symdyn.tape.node import is_zero
 
 @dataclass(frozen=True, kw_only=True)
 class UserFunction(Intrinsic):
-    """The function that symdyn.External makes; two with the same text are the same.
+    """Function that symdyn.External makes; two with the same text are the same.
 
     label, arguments, results   its name, names of its arguments, number of its results
     texts        pairs of a backend and the text of the function in its language

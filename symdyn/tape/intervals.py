@@ -1,9 +1,9 @@
 """Enclosures: from a tape the tape that bounds its values and their first two derivatives along a line, in interval arithmetic.
 
-A value that depends on s, -1 <= s <= 1, is a jet: three intervals that hold it, its derivative and its second derivative by s at
-every s. Jets of the leaves are given; those of results follow operation by operation, by the chain rule with ranges of f, f' and
-f'' over intervals. Ends of intervals are rounded to nearest: bounds hold but for rounding, unless values are widened by the
-rounding of every operation.
+A quantity that depends on s, -1 <= s <= 1, is a jet: three intervals that hold the value, its derivative and its second
+derivative by s at every s. Jets of the leaves are given; those of results follow operation by operation, by the chain rule with
+ranges of f, f' and f'' over intervals. Ends of intervals are rounded to nearest: bounds hold but for rounding, unless values are
+widened by the rounding of every operation.
 
 Source: Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009), chapters 2, 5 and 9.
 """
@@ -287,7 +287,7 @@ class _Intervals(Arithmetic):
         return _Truth(r.apply(op, args[0].must, args[1].must), r.apply(op, args[0].may, args[1].may))
 
     def select(self, condition: Any, yes: Jet, no: Jet) -> Jet:
-        """The branch that is not taken has no say; where the branch is not known, the value may jump."""
+        """The branch that is not taken has no effect; where the branch is not known, the value may jump."""
         truth = _Truth(condition, condition) if isinstance(condition, bool) else condition
         mixed = self.hull(yes.value, no.value), ANY, ANY
         return Jet(*[self.where(truth.must, a, self.where(truth.may, m, b)) for a, b, m in zip(yes, no, mixed, strict=True)])

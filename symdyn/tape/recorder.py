@@ -86,7 +86,7 @@ class Recorder:
 
     @contextmanager
     def section(self, title: str) -> Iterator[None]:
-        """Steps that are recorded inside stand under this heading in the emitted code."""
+        """Statements recorded inside stand under this heading in the emitted code."""
         outer, self._section = self._section, title
         try:
             yield

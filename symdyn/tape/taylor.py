@@ -2,8 +2,8 @@
 
 With a_k = a^(k)(t) / k! the coefficients of a product are the convolution of those of its factors, and a function y of a
 fulfils y' = (dy/da) a', another convolution. The terms of each with both indices from 1 to k - 1 are known from lower orders:
-they are sums S_k = sum_(j=1)^(k-1) a_j b_(k-j), which can be taken all at once. The rest of order k is linear in what is new,
-and is recorded on the tape again; where a factor does not move, nothing of the convolution is left.
+they are sums S_k = sum_(j=1)^(k-1) a_j b_(k-j), which can be taken all at once. The rest of order k is linear in the new
+coefficients, and is recorded on the tape again; where a factor does not move, nothing of the convolution is left.
 
 Sources: Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
 Experimental Mathematics 14 (2005); Griewank and Walther, Evaluating Derivatives, 2nd ed., chapter 13.

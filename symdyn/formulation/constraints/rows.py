@@ -32,7 +32,7 @@ from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT, PARAMETER, TIME, Node, is_zero
 from symdyn.tape.tape import Tape
 
-# What is smaller at STATES random states is zero but for rounding: lengths in m, directions.
+# Values that are smaller at STATES random states are zero but for rounding: lengths in m, directions.
 ROUNDING = 1e-13
 STATES = 3
 
@@ -119,8 +119,8 @@ class Gathered:
             return 1 if is_zero(total) else a.name("length", a.sqrt(total))
 
     def lever(self) -> Any:
-        """What angular speeds are multiplied by to compare them with others, m: root mean square of the distances of points of
-        joints on a moving body from the joint that carries it, else of centres of mass, else the length.
+        """Length by which angular speeds are multiplied to compare them with others, m: root mean square of the distances of
+        points of joints on a moving body from the joint that carries it, else of centres of mass, else the length.
 
         Neither the place of a mechanism nor the number of its bodies enters it, as both enter the length.
         """

@@ -42,14 +42,14 @@ class Sampled:
 
     @classmethod
     def of(cls, A: np.ndarray) -> Sampled:
-        """Of arrays (s, m, n): entries that are not zero at some state."""
+        """Entries of arrays (s, m, n) that are not zero at some state."""
         rows, columns = np.nonzero((A != 0).any(axis=0))
         _, m, n = A.shape
         return cls(m, n, rows, columns, A[:, rows, columns])
 
     @classmethod
     def of_entries(cls, entries: Entries) -> Sampled:
-        """Of a matrix on a tape."""
+        """Entries of a matrix on a tape."""
         m, n = entries.shape
         return cls(m, n, entries.indices // max(n, 1), entries.indices % max(n, 1), entries.values)
 
@@ -138,7 +138,7 @@ class Sampled:
         return changes
 
     def ranks(self) -> np.ndarray:
-        """How many singular values are more than RANK of the largest, (s,)."""
+        """Number of singular values of more than RANK of the largest, (s,)."""
         if not self.sparse:
             return self.by_singular_values()
         factors = self.triangular()
@@ -300,7 +300,8 @@ class Triangular:
         return sizes
 
     def combinations(self, count: int) -> np.ndarray:
-        """Of each row of A that was not kept, itself less what it is of those that were, (s, m, count)."""
+        """Combinations of rows of A that vanish: a row that was not kept less its combination of those that were, (s, m,
+        count)."""
         result = np.zeros((len(self.kept), len(self.R), count))
         for k, kept in enumerate(self.kept):
             own, others = np.flatnonzero(kept), np.flatnonzero(~kept)[:count]

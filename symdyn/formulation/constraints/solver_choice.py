@@ -85,7 +85,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     failing = {name: _failing(way, found) for name, way in ways.items()}
 
     def cost(name: str) -> tuple[float, float]:
-        """Of ways that raise where they fail, the part of the states before the operations."""
+        """Part of the states at which a way fails and raises, then its operations."""
         part = failing[name] if failing[name] > RARELY else 0.0
         return (part if too_large else 0.0), counts[name] + part * numeric
 

@@ -1,9 +1,9 @@
 """Base parameters: the smallest set of inertial parameters that the equations of motion depend on, tau = Y_b pi_b.
 
-What a joint does not set in motion is counted to the parent link (see regrouping), which leaves seven parameters of a link
-that turns and four of one that slides. Of these the columns of the regressor that are zero at every state are dropped:
-parameters without effect. Columns that follow from others, as those of a motor geared to a joint do, are dropped too, and
-their parameters added to those of the others with the factors by which they follow.
+Parameters that a joint does not set in motion are counted to the parent link (see regrouping), which leaves seven parameters of a
+link that turns and four of one that slides. Columns of the regressor that are zero at every state are dropped: parameters without
+effect. Columns that follow from others, as those of a motor geared to a joint do, are dropped too, and their parameters added to
+those of the others with the factors by which they follow.
 Source: Gautier and Khalil, Direct calculation of minimum set of inertial parameters of serial robots (1990); Khalil and
 Dombre, Modeling, Identification and Control of Robots, section 9.4.
 """

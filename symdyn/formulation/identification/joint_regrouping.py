@@ -44,6 +44,6 @@ def unmoved(S: np.ndarray, inertia: Inertia) -> Inertia:
 
 
 def coordinate_axis(e: np.ndarray) -> int | None:
-    """Which coordinate direction a vector of any length points along with a number, or None."""
+    """Index of the coordinate direction that a vector of any length points along with a number, or None."""
     along = [k for k in range(len(e)) if not is_zero(e[k])]
     return along[0] if len(along) == 1 and not isinstance(e[along[0]], Node) else None

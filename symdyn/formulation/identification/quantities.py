@@ -64,7 +64,7 @@ class BaseParameters:
     tau = M_tilde u_dot + k_tilde less what gravity gives: what all other loads together must give along the speeds.
     A parameter is named after what it is and the link that it is counted to, in the axes of the link's joint frame (child
     side; a joint axis that is no coordinate axis is its z). It is a sum over the parameters of that link and of others, as
-    `expressions` documents. What the model has as zero stays zero: give every body symbols for all ten parameters to get the
+    `expressions` documents. Zeros of the model stay zero: give every body symbols for all ten parameters to get the
     general set. Symbols for lengths and gravity stand for general values: give numbers where special ones matter.
 
     names        (n,) text; margins: least that an independent column of Y_b had left, most of a dependent one, of 1

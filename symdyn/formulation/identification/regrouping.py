@@ -1,6 +1,6 @@
 """How a dependent column of a regressor follows from independent ones, as expressions of the model's parameters.
 
-That it does is known from numbers; here the factors are found exactly. The equations of motion are linear in u_dot, and
+The dependence is known from numbers; here the factors are found exactly. The equations of motion are linear in u_dot, and
 what they depend on follows from their derivatives by u_dot and u and their value at rest. At states where sines, cosines
 and coordinates are short fractions these fold to short expressions of parameters, most of them zero, so that a factor is
 mostly one entry divided by another.

@@ -2,8 +2,8 @@
 
 M_tilde = sum of J_v^T m J_v + J_omega^T I J_omega, k_tilde = sum of J_v^T m a + J_omega^T (I alpha + omega x I omega), with a
 and alpha the accelerations that remain when u_dot = 0. Source: lecture, chapters 3.2 and 6.2 (k_tilde = J^T (M J_dot u + Q J u)).
-What remains is quadratic in the speeds: squares are centrifugal, products of two speeds Coriolis, and omega x I omega is
-gyroscopic; given motions of joints or of the ground add a part of their own.
+The accelerations that remain are quadratic in the speeds: squares are centrifugal, products of two speeds Coriolis, and omega x I
+omega is gyroscopic; given motions of joints or of the ground add a part of their own.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def smallest_eigenvalue(M: np.ndarray) -> float:
-    """Of a symmetric matrix (n, n), n of 1 or more, block by block of rows that depend on each other."""
+    """Smallest eigenvalue of a symmetric matrix (n, n), n of 1 or more, block by block of rows that depend on each other."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""Which rows of the constraints depend on the others, and which speeds on the others, found in numbers at consistent states:
+"""Rows of the constraints that depend on the others, and speeds that depend on the others, found in numbers at consistent states:
 the initial one, and those that are reached from there by walking along the motions that the constraints leave."""
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def _independent(samples: Sampled, rank: int, holonomic: np.ndarray) -> tuple[in
 
 
 def _without(left: np.ndarray, k: int) -> np.ndarray:
-    """Of the combinations (s, m, d) of rows those without row k, orthonormal again, (s, m, d - 1): by a reflection that leaves
+    """Combinations (s, m, d) of rows without row k, orthonormal again, (s, m, d - 1): by a reflection that leaves
     row k to the first of them."""
     row = left[:, k] / np.maximum(np.linalg.norm(left[:, k], axis=1, keepdims=True), 1e-300)
     axis = row + np.eye(row.shape[1])[0] * np.where(row[:, :1] < 0, -1.0, 1.0)

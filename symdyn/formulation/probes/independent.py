@@ -1,4 +1,4 @@
-"""Which columns of a matrix are independent at every state, tried at random states in double precision.
+"""Columns of a matrix that are independent at every state, tried at random states in double precision.
 
 A matrix whose entries are analytic in the state has the same dependencies between its columns at almost every state, so a
 few random ones show them. Columns are scaled to length one; what a column has left in addition to those before it is either of

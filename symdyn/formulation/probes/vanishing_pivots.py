@@ -73,7 +73,7 @@ def _filled(tree: Tree, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def behind(tree: Tree, k: int, twist: np.ndarray, blocks: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> Any:
-    """What the pivot of a joint is compared with whose link k has no mass: how large the terms are that it is the rest of.
+    """Reference for the pivot of a joint whose link k has no mass: size of the terms whose difference the pivot is.
 
     twist    of link k, (6,); blocks: of a link the (3, 3) of turning and of shifting of its inertia, with what hangs on it
     Twice the kinetic energy of the next links with mass, all joints between held, without the products of turning and shifting,
@@ -172,8 +172,8 @@ class _Position:
         self._of_inertia: dict[tuple[Any, ...], np.ndarray] = {}  # like bodies have the same nodes
 
     def squares(self, k: int, p: int, after: Sequence[int]) -> tuple[float, float]:
-        """Of the velocity that speed p gives to link k, in directions in which it has mass; and of its part that velocities by
-        the speeds `after` do not explain. NaN where it is no real number."""
+        """Square of the velocity that speed p gives to link k, in directions in which it has mass; and of its part that
+        velocities by the speeds `after` do not explain. NaN where it is no real number."""
         twists, directions = self.twists(k), self.directions(k)
         felt = directions @ twists[p]
         others = np.array([directions @ twists[c] for c in after]).reshape(len(after), len(felt)).T

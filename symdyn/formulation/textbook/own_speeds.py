@@ -1,4 +1,4 @@
-"""Which generalized speeds a joint has for its own, as propagation needs it."""
+"""Generalized speeds that a joint has for its own, as propagation needs them."""
 
 from __future__ import annotations
 

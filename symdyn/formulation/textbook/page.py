@@ -26,8 +26,8 @@ from symdyn.spatial.vectors import vector
 class Page:
     """The recursions of a tree, each recorded once, when one of its quantities is first asked for.
 
-    Of link k = 1, 2, ... (in the order of tree.links; bodies on fixed joints belong to the link before them), in space also
-    for planar systems:
+    Quantities of link k = 1, 2, ... (in the order of tree.links; bodies on fixed joints belong to the link before them), in space
+    also for planar systems:
 
     X_k, X_star_k   (6, 6) from the parent's frame to the link's (motions), from the link's to the parent's (forces)
     S_k, S_ring_k   (6, n) motion subspace and its apparent rate of change; I_k (6, 6)
@@ -36,9 +36,9 @@ class Page:
     I_A_k, p_A_k    (6, 6), (6,) articulated inertia and bias force, for the forces that the loads exert along the joints
     v_G_k, a_G_k, f_G_k   (6,) in the frame at the centre of mass; f_G the resultant on the link, weight counted as in a
 
-    Of all: coriolis (n_u, n_u), gravity_load (n_u,), momentum and momentum_G (6,), center_of_mass (3,); see their modules.
-    page_inverse_dynamics and page_accelerations (n_u,): what these recursions give for inverse_dynamics and accelerations, which
-    code is made from; they are compared in symdyn.verification.
+    Quantities of the whole tree: coriolis (n_u, n_u), gravity_load (n_u,), momentum and momentum_G (6,), center_of_mass (3,); see
+    their modules. page_inverse_dynamics and page_accelerations (n_u,): what these recursions give for inverse_dynamics and
+    accelerations, which code is made from; they are compared in symdyn.verification.
     `notes` says what the mechanism does not have, and why.
     """
 

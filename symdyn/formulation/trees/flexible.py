@@ -1,6 +1,6 @@
 """Flexible bodies in a tree: what their elastic coordinates add to the inertia, the forces and the energy of rigid links.
 
-The undeformed beam is part of the link that its clamped end belongs to. What is here depends on eta: from the kinetic energy
+The undeformed beam is part of the link that its clamped end belongs to. These quantities depend on eta: from the kinetic energy
 of ModalBody, with the momenta P = m v + omega x h + Ct eta_dot, L = I omega + h x v + Cr eta_dot and
 pi = Ct^T v + Cr^T omega + Me eta_dot, the equations are P_dot + omega x P = f, L_dot + omega x L + v x P = n and
 pi_dot - dT/deta = Q (Boltzmann and Hamel), written with the acceleration a of the clamped end.

@@ -64,7 +64,7 @@ def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
 
 
 def own_inertias(tree: Tree) -> list[Inertia | ArticulatedInertia]:
-    """Of every link, with the deflection of elastic bodies clamped to it and the water it moves along."""
+    """Inertia of every link, with the deflection of elastic bodies clamped to it and the water it moves along."""
     inertias: list[Inertia | ArticulatedInertia] = [link.effective for link in tree.links]
     for body in tree.flexible:
         if body.root != GROUND:

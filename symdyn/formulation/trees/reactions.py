@@ -2,8 +2,8 @@
 
 Nothing is merged or regrouped here: bodies held by fixed joints have reactions, too. The cut load of a joint is all that passes
 from its parent to its child through it. Its reaction is the cut load less what acts along its speeds: joint forces (drives,
-springs and dampers in the joint), gears, and constraints by expression. What holds a prescribed or dependent coordinate is a
-reaction.
+springs and dampers in the joint), gears, and constraints by expression. The force that holds a prescribed or dependent coordinate
+is a reaction.
 """
 
 from __future__ import annotations

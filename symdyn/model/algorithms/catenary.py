@@ -2,7 +2,7 @@
 
 # A line that hangs freely has no horizontal force if its ends are as near to one vertical as this part of its length.
 SYMDYN_NEAREST = 1e-9
-# Of doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
+# Multiple of the rounding of doubles, and relative change below which the next step of Newton's method is exact.
 SYMDYN_TINY, SYMDYN_CLOSE = 9e-16, 1e-8
 
 

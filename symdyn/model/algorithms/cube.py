@@ -5,7 +5,7 @@ SYMDYN_SHARES = 0.21132486540518713, 0.7886751345948129
 
 
 def symdyn_cut_corner(a, b, s, h, one, shares):
-    """What of the square |x|, |y| <= 1/2 lies where a (x + 1/2) + b (y + 1/2) < s, for a >= b >= 0: the integrals of 1, x, y,
+    """Part of the square |x|, |y| <= 1/2 where a (x + 1/2) + b (y + 1/2) < s, for a >= b >= 0: the integrals of 1, x, y,
     x^2, x y, y^2; half the height of the part of the line that is inside; (1, x, y, h) at the two Gauss points of that part."""
     zero = one - one
     # Counted from a corner, it is as wide as the square below y0; then its width falls from w0 to w1 at y1.

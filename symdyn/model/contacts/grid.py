@@ -30,7 +30,8 @@ HIGHEST = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Spline(UserFunction):
-    """Of its variables and the orders of the derivatives by them, which are whole numbers: its value or such a derivative.
+    """Function of its variables and of the orders of the derivatives by them, which are whole numbers: its value or such a
+    derivative.
 
     knots, degrees   along each variable
     coefficients     of a grid (n_x, n_y), of polynomials (n_pieces, degree + 1) from the highest

@@ -84,7 +84,7 @@ class RigidContact:
 
     @property
     def shares(self) -> list[sp.Symbol]:
-        """Of a contact in space the parameters p that say how soft its rows are while it sticks and shares forces, 1/(1 + p^2):
+        """Parameters p of a contact in space for the softness of its rows while it sticks and shares forces, 1/(1 + p^2):
         those of the direction of its slip, which it has none of then."""
         return [self.sliding[1], self.sliding[0], self.sliding[0]] if len(self.sliding) == 2 else []
 

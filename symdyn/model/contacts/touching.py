@@ -46,7 +46,7 @@ from symdyn.tape.walk import Arithmetic, walk
 
 # A step of Newton's method below this part of the size is the last one of doubles: the next would be below their rounding.
 CLOSE = 1e-9
-# What its text in C calls.
+# Function that its text in C calls.
 PART = "symdyn_touching"
 
 
@@ -318,7 +318,7 @@ class _Python(_Lines):
 
 
 def _names(i: Implicit) -> list[str]:
-    """Of the unknowns and of what is known."""
+    """Names of the unknowns and of the known quantities."""
     return [*[f"s{k}" for k in range(len(i.unknowns))], *[f"p{k}" for k in range(len(i.known))]]
 
 

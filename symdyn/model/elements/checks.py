@@ -40,7 +40,8 @@ def not_negative(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Ex
 
 
 def least_eigenvalue(matrix: sp.MatrixBase) -> float:
-    """Of a symmetric matrix of numbers; zero where it is negative by rounding alone, and for one with symbols."""
+    """Least eigenvalue of a symmetric matrix of numbers; zero where it is negative by rounding alone, and for one with
+    symbols."""
     if symbols_of(matrix):
         return 0.0
     values = np.array(matrix.tolist(), dtype=float)

@@ -116,7 +116,7 @@ class LinearStiffness(Element):
                         f"{TILT:g} degrees")
 
     def _turn(self, site: Site) -> Validity:
-        """Of a potential that is alike on both sides of half a turn the energy decides nothing."""
+        """The energy of a potential that is alike on both sides of half a turn decides nothing."""
         a, r = site.algebra, site.rotation_vector
         return Validity(f"turn of {self.where}", a.sqrt(dot(r, r)) * 180 / a.recorder.pi(), -1.0, TURN,
                         f"{self.where}: the body has turned by {{value}} degrees; at half a turn its angles jump, and the "
