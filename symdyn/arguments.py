@@ -87,7 +87,7 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
 
 
 class OverTime:
-    """What stands for an input over time."""
+    """Base of objects that stand for an input over time."""
 
 
 def over_time(value: Any) -> bool:
@@ -97,7 +97,7 @@ def over_time(value: Any) -> bool:
 
 
 def _of_one_time(name: str, value: Any, names: Sequence[str]) -> str:
-    """What to say of an input over time where its number at one time belongs."""
+    """Message about an input over time where its number at one time belongs."""
     fault = (f"{name} is {shown(value, 60)}, over time; functions, splines and tables are for simulate, simulate_batch and "
              "consistent. Here pass its number at this time")
     if f"{name}_dot" not in names:

@@ -1,4 +1,4 @@
-"""Which formulation to take when none is named: every candidate is derived, and the one with the least predicted time wins.
+"""Choice of the formulation when none is named: every candidate is derived, and the one with the least predicted time wins.
 
 The prediction rests on exact properties of the tape alone, so that the choice is the same on every machine: how many cycles
 a processor takes for its steps in their order (symdyn.tape.cycles), how many there are, and the sines and cosines.
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 # Nanoseconds for each of the `terms` of a tape. `symdyn bench costs` measures the compiled right-hand sides of all candidates
 # of 40 systems and fits these by non-negative least squares of the relative errors; here with gcc 12 on an AMD EPYC of
-# 3.4 GHz (Zen 3). Of the models that it compares, this one lost the least time where it had not been fitted.
+# 3.4 GHz (Zen 3). This one lost the least time, of the models that it compares, where it had not been fitted.
 COSTS = {"cycles": 0.302, "beyond": 0.167, "sines": 24.2, "angles": 4.22}
 # Instructions that the processor keeps decoded; all further ones are decoded in every evaluation.
 KEPT_DECODED = 900
-# Of right-hand sides longer than this, operations, what is unlikely to win is not derived: body frames where axes are
+# Right-hand sides longer than this, operations, are not derived in ways that are unlikely to win: body frames where axes are
 # parallel (parallel ones took fewer cycles in every long one), and the mass matrix unless it promises to win by far.
 LONG = 10_000
 PROMISING = 0.7
@@ -63,7 +63,7 @@ class Candidate:
 
     @property
     def time(self) -> float:
-        """What is compared: the measured time where there is one."""
+        """Time that is compared: the measured one where there is one."""
         return self.predicted if self.measured is None else self.measured
 
     def __str__(self) -> str:
@@ -74,7 +74,7 @@ class Candidate:
 
 
 def terms(tape: Tape, run: Schedule) -> dict[str, float]:
-    """What the prediction weighs, under the names of COSTS; run is the schedule of the tape.
+    """Quantities that the prediction weighs, under the names of COSTS; run is the schedule of the tape.
 
     cycles   of one evaluation from when sines and cosines are known
     beyond   instructions beyond KEPT_DECODED
@@ -164,7 +164,7 @@ class Derived:
 
     @cached_property
     def run(self) -> Schedule:
-        """What an evaluation takes."""
+        """Schedule of an evaluation."""
         return schedule(self.tape)
 
     @cached_property

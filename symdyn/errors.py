@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def no_value(names: Sequence[str]) -> str:
-    """What to say of parameters, or whatever else takes numbers by name, that have neither a value nor a default."""
+    """Message about parameters, or other quantities by name, that have neither a value nor a default."""
     return f"no value for {', '.join(names)}, which {'have' if len(names) > 1 else 'has'} no default"
 
 

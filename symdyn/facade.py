@@ -58,7 +58,7 @@ def _motion(facade: MotionFacade) -> MotionEquations:
 
 
 class SystemFacade:
-    """What comes of a described mechanism: equations, modules, pictures and files."""
+    """Results of a described mechanism: equations, modules, pictures and files."""
 
     def embedding(self, frames: str = "body") -> EmbeddedEquations:
         """The embedded equations M_tilde u_dot + k_tilde = F_tilde: mass matrix by composite bodies, factorized.
@@ -254,7 +254,7 @@ class SystemFacade:
 
 
 class EquationsFacade:
-    """What comes of equations: prints, modules, proofs, functions for other libraries."""
+    """Results of equations: prints, modules, proofs, functions for other libraries."""
 
     def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
               simplify: bool = True) -> Typeset:
@@ -489,7 +489,7 @@ class EquationsFacade:
 
 
 class MotionFacade:
-    """What analytical mechanics makes of equations of motion."""
+    """Analytical mechanics of equations of motion."""
 
     @property
     def momentum_symbols(self) -> sp.Matrix:

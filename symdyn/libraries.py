@@ -95,7 +95,7 @@ class Libraries:
 
     @cached_property
     def breaks(self) -> Tape | None:
-        """What passes zero where the right-hand side has a kink or a jump, as `surfaces`; None where it has none."""
+        """Quantities that pass zero where the right-hand side has a kink or a jump, as `surfaces`; None where it has none."""
         recorder = self.equations.recorder
         result = breaks(recorder, self.equations.quantity("rhs").tolist())
         return Tape.of(recorder, surfaces=np.array(result, dtype=object)) if result else None

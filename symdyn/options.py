@@ -10,7 +10,7 @@ from symdyn.shown import shown
 
 
 def wrong_option(name: str, function: Callable[..., Any], options: Mapping[str, Any]) -> str:
-    """Of the first option that a function does not take, or not of this kind, what is wrong; empty if all are right.
+    """Fault of the first option that a function does not take, or not of this kind; empty if all are right.
 
     name   of the function, as messages name it
     """

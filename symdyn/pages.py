@@ -30,7 +30,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def titled(thing: object, *tables: str) -> str:
-    """What a notebook shows of an object: how it prints, then tables."""
+    """HTML of an object in a notebook: its printed form, then tables."""
     return f"<div><b>{escape(repr(thing))}</b>{''.join(tables)}</div>"
 
 

@@ -19,10 +19,10 @@ samples if
     min(|g_i|, |g_j|) > beta h^2/8 with one sign              g differs from the chord by no more than that,
     |g_i - g_j| > beta h^2/2                                  g is monotone between them.
 
-The bounds hold for the state and the inputs that the samples show, which are smooth within a step. What is neither, or not
-proved, is divided at its middle, so that a quantity is sampled as finely as it varies, and finest near its extremes close
-to zero. Source: Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 8 and 18; Boyd, SIAM J. Numer.
-Anal. 40 (2002), 1666, for zeros by division into parts.
+The bounds hold for the state and the inputs that the samples show, which are smooth within a step. A panel that is neither, or
+not proved, is divided at its middle, so that a quantity is sampled as finely as it varies, and finest near its extremes close to
+zero. Source: Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 8 and 18; Boyd, SIAM J. Numer. Anal.
+40 (2002), 1666, for zeros by division into parts.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ AT_CHECK = np.cos(np.arange(N) * math.acos(_CHECK_AT)) @ COEFFICIENTS
 
 
 def undecided(values: np.ndarray) -> np.ndarray:
-    """Which quantities may have zeros on a panel that the signs at its ends do not show, (n,) of bool.
+    """Mask of the quantities that may have zeros on a panel that the signs at its ends do not show, (n,) of bool.
 
     values   at the nodes and at the check point, (N + 1, n)
     """
@@ -115,7 +115,7 @@ def jets(left: float, right: float, values: np.ndarray) -> np.ndarray:
 
 
 def unproved(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """Which quantities may have zeros between samples, of those that `undecided` decides, (n,) of bool.
+    """Mask of the quantities that may have zeros between samples, of those that `undecided` decides, (n,) of bool.
 
     values   at the nodes and at the check point, (N + 1, n); bounds: of value, derivative and second derivative, (n, 6)
     """

@@ -75,7 +75,7 @@ def number(value: Any) -> float:
 
 
 def length_of(values: Any) -> int | None:
-    """How many entries a list or array has, without a look at them; None for what has no length, such as one number."""
+    """Number of entries of a list or array, which are not read; None for what has no length, such as one number."""
     if isinstance(values, type) or not hasattr(values, "__len__") or (hasattr(values, "ndim") and values.ndim == 0):
         return None
     return len(values)

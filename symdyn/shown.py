@@ -11,7 +11,8 @@ LENGTH = 120
 def shown(value: Any, length: int = LENGTH) -> str:
     """The value's repr, cut to so many characters, and its type where there is no repr.
 
-    A whole number of thousands of digits has none: Python does not write it out. What a user's own class raises passes for none.
+    A whole number of thousands of digits has none: Python does not write it out. A repr of a user's class that raises counts as
+    none.
     """
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
         return f"a whole number of about {int(value.bit_length() * 0.30103) + 1} digits"

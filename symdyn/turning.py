@@ -1,4 +1,4 @@
-"""Which coordinates and speeds turn, by their units: the one place where that is decided, for derivation, code and runtime.
+"""Coordinates and speeds that turn, by their units: the one place where that is decided, for derivation, code and runtime.
 
 A speed without a length in its unit becomes a velocity by the mechanism's length, one in m/s is a velocity already. Speeds of a
 Custom joint without units are in 1/s, so that they count as turning; units=["m"] makes a coordinate one that slides.

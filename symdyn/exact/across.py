@@ -1,6 +1,6 @@
 """Equations of one mechanism that were derived separately, proved equal by exact algebra: embedding = recursive = augmented.
 
-What is recorded for the second equations is recorded again on the tape of the first, with the same leaves. Quantities are then
+The steps of the second equations are recorded again on the tape of the first, with the same leaves. Quantities are then
 compared entry by entry. Accelerations are quotients of determinants, and are not compared with each other: those of the second
 equations must solve the first ones, which is the same where the mass matrix is regular, and far shorter.
 """

@@ -1,8 +1,8 @@
 """Plain polynomials arranged to be read: factored, grouped by what multiplies what, nested; the shortest by one cost.
 
-A polynomial is a dict from monomials to fractions; a monomial is a sorted tuple of (letter, power). What comes out is a sum or a
-product: Product(number, ((letter or Sum, power), ...)) and Sum((Product, ...)). No relations between letters are used here.
-The cost counts what is written: an operation for each sign between terms, product, fraction bar, power and function, as
+A polynomial is a dict from monomials to fractions; a monomial is a sorted tuple of (letter, power). The result is a sum or a
+product: Product(number, ((letter or Sum, power), ...)) and Sum((Product, ...)). No relations between letters are used here. The
+cost counts what is written: an operation for each sign between terms, product, fraction bar, power and function, as
 sympy.count_ops does; of equal ones the fewer letters and digits.
 Source of the nesting: Ceberio and Kreinovich, Greedy algorithms for optimizing multivariate Horner schemes, SIGSAM Bulletin 38
 (2004).
@@ -41,7 +41,7 @@ _KINDS = (("motion",), ("parameter",), ("position",))
 
 @dataclass(frozen=True)
 class Letter:
-    """What a letter is written as: operations and length of its name, and the kind by which terms are grouped.
+    """Written form of a letter: operations and length of its name, and the kind by which terms are grouped.
 
     kind     "parameter", "position" (coordinates, functions of them, t) or "motion" (speeds, accelerations, inputs)
     below    whether it stands for what a fraction is divided by
@@ -81,7 +81,7 @@ def total(tree: Tree) -> Cost:
 
 
 class _Parts(dict[Monomial, tuple[Monomial, Monomial]]):
-    """What of a monomial is in letters of these kinds, and the rest."""
+    """Part of a monomial in letters of these kinds, and the rest."""
 
     def __init__(self, letters: Mapping[int, Letter], kinds: tuple[str, ...]) -> None:
         super().__init__()
@@ -275,7 +275,7 @@ class Arranger:
                 merged.setdefault(_UNIT, ({}, {(): 1}))[0][row[0]] = p[row[0]]
                 continue
             number, common, q = stripped({parts[m][1]: p[m] for m in row})
-            # What is common goes with the group; what is left says which groups belong together.
+            # The common factor goes with the group; the rest tells which groups belong together.
             left, _ = merged.setdefault(frozenset(q.items()), ({}, q))
             left[multiplied(own, common)] = number
         return None if len(merged) == 1 or len(merged) == len(p) else list(merged.values())

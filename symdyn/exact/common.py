@@ -1,4 +1,4 @@
-"""What both sides of equalities have in common, taken as variables.
+"""Steps that both sides of equalities have in common, taken as variables.
 
 Two ways to one quantity often begin with the same steps. Sides that are equal for any values of what these compute are equal;
 the other way round that need not be so, since relations between the steps are left out, such as that rows of a rotation are

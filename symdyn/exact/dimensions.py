@@ -52,7 +52,7 @@ def parsed(unit: str | None) -> Dimension | None:
 
 
 def _product_of(tokens: list[str]) -> Dimension | None:
-    """What the first tokens say, up to a bracket that closes; these are removed. None for what is no unit."""
+    """Dimension by the first tokens, up to a bracket that closes; these are removed. None for what is no unit."""
     total: Dimension = {}
     sign, factors = 1, 0
     while tokens and tokens[0] != ")":

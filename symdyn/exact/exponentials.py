@@ -2,8 +2,8 @@
 positive.
 
 Exponents are sums of terms with rational factors. Each term has a letter for the exponential function of its largest part that
-all exponents hold whole multiples of. What is equal for all positive values of these letters is equal; the other way round that
-need not be so, since terms may depend on each other.
+all exponents hold whole multiples of. Expressions that are equal for all positive values of these letters are equal; the other
+way round that need not be so, since terms may depend on each other.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What polynomials become where others are zero: constraints as relations, in addition to those of sines, cosines and roots.
+"""Polynomials where others are zero: constraints as relations, in addition to those of sines, cosines and roots.
 
 A polynomial that multiples of the relations add up to vanishes wherever they do: division leaves no rest. By the relations
 themselves that depends on their order; by a Groebner basis none is left exactly where there are such multiples. The basis is
@@ -22,7 +22,7 @@ from symdyn.exact.ring import Ring
 LIMITS = ((60, 1000, 300), (200, 3000, 500))
 # Longer relations and rests are not divided.
 TERMS = 5_000
-# Of rests with so many terms the square is tried, too.
+# Rests with up to so many terms are tried squared, too.
 SQUARED = 40
 
 
@@ -77,7 +77,7 @@ class Ideal:
 
 
 def _rest(p: Any, divisors: Sequence[Any]) -> Any:
-    """What division leaves, again and again, in this order."""
+    """Rest of repeated division in this order."""
     while True:
         before = p
         for divisor in divisors:

@@ -204,7 +204,7 @@ def _energy_on_constraints(s: _Quantities) -> Pairs | None:
 
 
 def _solved(s: _Quantities) -> Pairs | None:
-    """What the accelerations are solved from."""
+    """Equations that are solved for the accelerations."""
     if not s.has("M_tilde", "k_tilde", "F_tilde", "accelerations") or s.equations.implicit_loads or len(s.u) > SPEEDS:
         return None
     left = s["M_tilde"] @ s["accelerations"] + s["k_tilde"]
@@ -281,7 +281,7 @@ def _constraint_accelerations(s: _Quantities) -> Pairs | None:
 
 
 def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
-    """Which of the claims exact algebra proves with products of up to QUICK terms, whatever machine it runs on."""
+    """Claims that exact algebra proves with products of up to QUICK terms, whatever machine it runs on."""
     own = _Quantities(equations)
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     positive = not_negative(equations.printed_leaves())

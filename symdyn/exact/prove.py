@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
 # Every fourth state has numbers down to minus this.
 WIDE = 20.0
-# Of a difference that is rounding no more than this part remains with twice the digits.
+# A difference that is rounding keeps no more than this part with twice the digits.
 REMAINDER = 1e-10
 DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
 # Axes of decimal numbers are divided by their length at sixty digits; that their squares add up to one is true up to this. Their
@@ -180,8 +180,8 @@ def _proved_with_exponentials(left: Sequence[sp.Expr], right: Sequence[sp.Expr])
 
 
 def _with_difference(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
-    """How the sides differ, with symbols of one side only, and those of one name that are not the same, of which the one in b is
-    printed with a stroke."""
+    """Difference of the sides, with symbols of one side only, and those of one name that are not the same, of which the one in b
+    is printed with a stroke."""
     if all(e == 0 for e in right):
         return proof.reason
     sides = [{s for e in side for s in symbols_of(e)} for side in (left, right)]
@@ -358,7 +358,7 @@ def _written_as_zero(exact: Exact, symbols: Mapping[Node, sp.Expr], k: int) -> b
 
 
 def _by(exact: Exact | None, symbols: Mapping[Node, sp.Expr], k: int, before: str = " by ") -> str:
-    """What is left of the difference of a pair; "" where that is long."""
+    """Rest of the difference of a pair; "" where that is long."""
     if exact is None or len(exact.values[k].num) > WRITTEN:
         return ""
     text = shown(Writer(exact, symbols).write(exact.values[k]))

@@ -1,7 +1,7 @@
 """One value in several sets of letters: sines and cosines of base angles, of sums of angles, Fourier form.
 
 The polynomial in sines and cosines of base angles is a normal form, but not the shortest: c1 c2 - s1 s2 is cos(q1 + q2), and of
-s^2 and c^2 either may be written by the other. What leaves here is a plain polynomial in letters, for symdyn.exact.arrange.
+s^2 and c^2 either may be written by the other. The result is a plain polynomial in letters, for symdyn.exact.arrange.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Letters:
         return self._partners[x, y]
 
     def theorems(self, m: Monomial) -> Theorems:
-        """What this term may be combined with."""
+        """Theorems that may combine this term with others."""
         if m not in self._theorems:
             self._theorems[m] = _theorems(m, self)
         return self._theorems[m]

@@ -47,7 +47,7 @@ TERMS = 20_000
 MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before
 # SymPy combines terms; up to FACTOR_TERMS operations common factors are taken out of it, if it then has no more than NEAR times
-# as many. SymPy's factor_terms leads to longer ones and takes ten times as long. What has more than CLOSE times as many is not
+# as many. SymPy's factor_terms leads to longer ones and takes ten times as long. A form with more than CLOSE times as many is not
 # the shortest.
 LONGER, FACTOR_TERMS, NEAR, CLOSE = 2.4, 250, 1.6, 1.2
 
@@ -80,7 +80,7 @@ class WrittenAngles:
         return total
 
     def node(self, node: Node | Inverse) -> sp.Expr:
-        """What stands in an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
+        """Part of an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
         if isinstance(node, Inverse):
             return 1 / self.node(node.node)
         if node.op == "leaf":
@@ -135,7 +135,7 @@ class Writer:
     # -- letters
 
     def expression(self, letter: int) -> sp.Expr:
-        """What a letter is in SymPy."""
+        """Expression of a letter in SymPy."""
         if letter not in self._expressions:
             self._expressions[letter] = self._made(letter)
         return self._expressions[letter]
@@ -212,7 +212,7 @@ class Writer:
         result = _turned_below(self.tree_expression(tree))
         divided_by_sum = any(len(self.exact.ring.factors[k]) > 1 for k, _ in value.under)
         if self.form == "shortest" and divided_by_sum and len(value.num) <= LONG:
-            # Which way of writing what it is divided by is the shorter one turns out once signs are taken into it.
+            # The shorter way of writing the divisor turns out once signs are taken into it.
             if self._nested is None:
                 self._nested = Writer(self.exact, self.symbols, "nested")
             result = min(result, self._nested.write(value), key=sp.count_ops)
@@ -482,7 +482,7 @@ def written_out(entries: Sequence[Any]) -> dict[Node, int]:
 
 
 def _taken_out(e: Any, numbers: bool = False) -> Any:
-    """What stands in several terms of a sum taken out of these: a b + a**2 c + d as a (b + a c) + d; numbers: common ones too."""
+    """Factors of several terms of a sum taken out of these: a b + a**2 c + d as a (b + a c) + d; numbers: common ones too."""
     if not e.args or not e.has(sp.Add):
         return e
     e = e.func(*[_taken_out(a, numbers) for a in e.args])

@@ -136,7 +136,7 @@ class Exact:
             args, item = atom.args, atom.item
             key = f"{atom.op}{item}({','.join(self._key(a) for a in args)})"
             if key not in known and len(args) == 1 and isinstance(args[0], Value):
-                # Of equal fractions, numerators and denominators may differ.
+                # Equal fractions may differ in numerators and denominators.
                 others = same.setdefault(f"{atom.op}{item}", [])
                 known.update((key, result) for a, result in others if (a.under or args[0].under)
                              and len(ring.sub(a, args[0]).num) == 0)
@@ -280,7 +280,7 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: 
     number = fraction(unit)
     root = _root_of_square_in(abs(number.numerator) * number.denominator)
     outside = ring.mul(outside, ring.number(Fraction(root, number.denominator)))
-    # What is left of the number, and its sign, which stays with what may be negative.
+    # Rest of the number, and its sign, which stays with the factor that may be negative.
     left = abs(number.numerator) * number.denominator // root**2
     rest = ring.context.constant(1 if number > 0 else -1)
     result = []

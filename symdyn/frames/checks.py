@@ -1,4 +1,4 @@
-"""What is given for frames and points, taken over with all faults reported at once."""
+"""Arguments given for frames and points, read with all faults reported at once."""
 
 from __future__ import annotations
 

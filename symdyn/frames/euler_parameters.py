@@ -57,5 +57,5 @@ def _parameters(R: sp.ImmutableMatrix) -> list[sp.Expr] | None:
 
 
 def _matches(component: float, values: np.ndarray) -> list[tuple[int, int]]:
-    """Which of the values a component is, with its sign."""
+    """Indices of the values that a component equals, with its sign."""
     return [(k, 1 if component > 0 else -1) for k, value in enumerate(values) if abs(value - abs(component)) < CLOSE]

@@ -134,7 +134,7 @@ def _with_rates(given: dict[str, sp.Expr], over_time: bool) -> dict[str, sp.Expr
 
 
 class _Values:
-    """What each symbol stands for on a tape: what was given for it, or a leaf with a value for each time."""
+    """Values of symbols on a tape: what was given for each, or a leaf with a value for each time."""
 
     def __init__(self, table: dict[str, sp.Expr], functions: dict[str, np.ndarray]) -> None:
         self.recorder = Recorder()

@@ -14,7 +14,7 @@ from symdyn.frames.checks import FrameFaults
 from symdyn.model.joints.base import numeric
 from symdyn.model.symbols import symbols_of
 
-# What counts as rounding in an inertia, of its largest entry.
+# Part of the largest entry of an inertia that counts as rounding.
 ROUNDING = 1e-9
 
 

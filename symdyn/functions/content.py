@@ -1,4 +1,5 @@
-"""What is emitted: from equations and names of functions to the tapes, names, units and records that a backend takes."""
+"""Content of generated code: from equations and names of functions to the tapes, names, units and records that a backend
+takes."""
 
 from __future__ import annotations
 
@@ -47,7 +48,7 @@ WORK = "(work)"
 def content_of(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
                right_side: RightSide,
                columns: Callable[[Equations, str, RightSide], Columns | None] | None = None) -> Content:
-    """What a backend takes to emit the named functions.
+    """Content that a backend takes to emit the named functions.
 
     standalone   with what is documented in a file that is written
     bound        parameters that become numbers in the code, by name
@@ -120,7 +121,7 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
 
 
 def _ranges(ranges: Iterable[Range]) -> tuple[tuple[str, str, float, bool, float], ...]:
-    """What numbers of a contact may be, as plain data."""
+    """Ranges of the numbers of a contact, as plain data."""
     return tuple((one.what, one.value.name if one.value.is_Symbol else "", one.least, one.reached, one.below) for one in ranges)
 
 
@@ -157,7 +158,8 @@ def closed_names(equations: Equations) -> list[str]:
 
 
 def _leaf_places(equations: Equations, n_x: int) -> list[int]:
-    """What bounds events, see `event_leaves`, where x has n_x entries, of which the last ones may be those of the run."""
+    """Indices of the leaves that bound events, see `event_leaves`, where x has n_x entries, of which the last ones may be those
+    of the run."""
     symbols = equations.symbols
     own = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
     return [k if k <= own else k + n_x - own for k in event_leaves(equations)]

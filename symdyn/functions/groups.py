@@ -1,4 +1,4 @@
-"""Which functions are emitted together: into a file, or into one compiled library of a module."""
+"""Functions that are emitted together: into a file, or into one compiled library of a module."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from symdyn.functions.table import BATCH, CONSISTENCY, FUNCTIONS, STANDARD, STAT
 from symdyn.functions.tapes import has_function
 from symdyn.shown import shown
 
-# What constraints add to the standard functions; with the corrections the integrator keeps a motion on its manifold.
+# Functions that constraints add to the standard ones; with the corrections the integrator keeps a motion on its manifold.
 OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
-# What time stepping with contacts takes, compiled together.
+# Functions that time stepping with contacts takes, compiled together.
 OF_CONTACTS = ("contact_gaps", "contact_directions", "contact_spheres")
 _OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
 

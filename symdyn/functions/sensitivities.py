@@ -128,7 +128,7 @@ def _tape(equations: Equations, name: str, values: np.ndarray) -> Tape:
 
 def _columns(equations: Equations, sensitivities: Sequence[str], held: Sequence[str],
              followed: Sequence[str]) -> list[dict[str, Any]]:
-    """Of each column x, the leaves of its entries, and all, what stands for the direction, by name."""
+    """Values that stand for the direction in each column x, the leaves of its entries, and in all, by name."""
     symbols, recorder = equations.symbols, equations.recorder
     n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
     leaves = [recorder.leaf(name, STATE) for name in column_names(symbols, sensitivities)]

@@ -1,8 +1,8 @@
 """The functions of a module in one table: the quantity behind each, the shape of its result, what it says, what it needs.
 
 Shapes are in these letters: n_q coordinates, n_u speeds, n_z further states, n_x = n_q + n_u + n_z, n_in inputs, n_p parameters,
-n_c rows of constraints, n_b bodies, n_j joints, n_e events, d = 6 velocities of a body, in a plane 3. What has no shape here has
-one that the mechanism decides.
+n_c rows of constraints, n_b bodies, n_j joints, n_e events, d = 6 velocities of a body, in a plane 3. A function without a shape
+here has one that the mechanism decides.
 """
 
 from __future__ import annotations
@@ -114,10 +114,10 @@ FUNCTIONS = _entries(
     ("jacobian_params", "jacobian_params", ("n_x", "n_p"), "exact derivative of x_dot by the parameters", ""),
     ("input_matrix", "input_matrix", ("n_u", "n_in"), "exact derivative of F_tilde by the inputs", "inputs"),
 )
-# What the header adds where there are constraints, which these functions leave out.
+# Text that the header adds where there are constraints, which these functions leave out.
 OF_THE_CUT_TREE = {"inverse_dynamics": ", of the tree: loops cut, without constraints"}
 
-# Of statics and linearization, compiled together.
+# Functions of statics and linearization, compiled together.
 STATICS = _entries(
     ("balance", "balance", None,
      "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot; C_dot; C_ddot; q_dot; q_ddot]; ud: u_dot, lam", ""),
@@ -139,9 +139,9 @@ DERIVATIVES = _entries(
 )
 ALL = {**FUNCTIONS, **STATICS, **VARIATIONS, **DERIVATIVES}
 
-# What consistent states are found with: compiled together.
+# Functions by which consistent states are found, compiled together.
 CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")
-# What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
+# Functions that are written to files by default; Jacobians and the like are long and made on request.
 STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
 
 
@@ -160,6 +160,6 @@ def quantity_of(name: str) -> str:
 
 
 def title_of(name: str, constrained: bool) -> str:
-    """What the header of generated code says about a function."""
+    """Description of a function in the header of generated code."""
     title = ALL[name].title if name in ALL else name
     return title + (OF_THE_CUT_TREE.get(name, "") if constrained else "")

@@ -187,7 +187,7 @@ _JACOBIANS = {f"jacobian_{by}": ("rhs", by) for by in ("x", "inputs", "params")}
 
 
 def given_rates(equations: Equations, names: Sequence[str], sensitivities: Sequence[str] = ()) -> list[str]:
-    """What stands in the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
+    """Names of the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
     for the residual the rates of the coordinates, too, and multipliers; with sensitivities what carries them across resets,
     behind bounds of events."""
     symbols, n_c = equations.symbols, len(equations.constraints)

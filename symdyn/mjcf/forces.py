@@ -233,7 +233,7 @@ class Forces:
         return None, None
 
     def _command(self, i: int, name: str, dynamics: str) -> Any:
-        """What the gain acts on: the input, or the state that follows it."""
+        """Quantity that the gain acts on: the input, or the state that follows it."""
         u = self.tree.commands[i] = inputs(self.tree.names.symbol(name))
         if dynamics == "NONE":
             return u

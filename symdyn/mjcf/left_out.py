@@ -1,4 +1,4 @@
-"""What a model has that is not taken over: some of it is rejected, the rest reported in one warning."""
+"""Elements of a model that are not supported: some are rejected, the rest reported in one warning."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from symdyn.mjcf.compiled import Compiled
 from symdyn.urdf.values import nearest
 
-# What is reported, and what stands for all of a kind in leave_out.
+# Kinds that are reported, whose names stand for all of a kind in leave_out.
 KINDS = ("contacts", "limits", "friction", "ranges", "inactive", "mocap")
 _SHOWN = 4
 

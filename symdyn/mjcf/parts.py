@@ -1,4 +1,4 @@
-"""What a mechanism is written as: numbers, poses, joints with one coordinate."""
+"""Parts of a written mechanism: numbers, poses, joints with one coordinate."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def scalars_of(joint: Joint, numbers: Numbers, number: int = -1) -> Iterator[Sca
 
 
 def pose_of(joint: Joint, numbers: Numbers) -> Pose:
-    """Of the child in the parent where the joint's coordinates are zero."""
+    """Pose of the child in the parent where the joint's coordinates are zero."""
     on_parent, on_child = (Pose(numbers.array(R), numbers.array(p).ravel()) for R, p in (
         (joint.parent_rotation, joint.parent_point), (joint.child_rotation, joint.child_point)))
     return on_parent @ on_child.inverse()

@@ -25,7 +25,7 @@ from symdyn.urdf.poses import Pose
 
 # Moments of inertia below this MuJoCo rejects, kg m^2, and masses, kg.
 _LEAST = 1e-15
-# What moments of inertia point masses are given, kg m^2.
+# Moments of inertia that point masses are given, kg m^2.
 _POINT = 1e-14
 
 
@@ -70,7 +70,7 @@ class _Writer:
         self.actuators: list[str] = []
         self.rotors: set[int] = set()
         self.points: list[str] = []
-        # Of the keyframe, in MuJoCo's order, which is that of the text.
+        # Values of the keyframe, in MuJoCo's order, which is that of the text.
         self.q_start: list[float] = []
         self.u_start: list[float] = []
         self.commands: list[str] = []
@@ -186,7 +186,7 @@ class _Writer:
         chain = self._chain(first)
         body = self.model.children[chain[-1]]
         poses = [pose_of(self.model.joints[k], self.numbers) for k in chain]
-        # Of each child's frame in the chain the pose of the last, where all coordinates are zero.
+        # Pose of the last frame of the chain in each child's, where all coordinates are zero.
         outer = [Pose()]
         for pose in reversed(poses[1:]):
             outer.append(pose @ outer[-1])

@@ -77,7 +77,7 @@ class Precise:
         return self._program(name)([t, *x])
 
     def sides(self) -> Sides | None:
-        """On which side of its kinks the right-hand side is: of events whose reset changes nothing, which end steps. None where
+        """Side of its kinks that the right-hand side is on: of events whose reset changes nothing, which end steps. None where
         there are none."""
         places = [k for k, event in enumerate(self.equations.events) if event.reset and all(a == b for a, b in event.reset)]
         if not places:
@@ -180,7 +180,7 @@ def agreement(a: Motion, b: Motion) -> float:
 
 
 def record(equations: Equations, end: Any, digits: int = DIGITS) -> dict[str, Any]:
-    """What is stored of a motion: the digits in which runs at two tolerances agree, and what they took."""
+    """Record of a motion to store: the digits in which runs at two tolerances agree, and what they took."""
     coarse, fine, compiled = quad.twice(lambda n, compiled: motion(equations, end, n, compiled), digits, MORE)
     differ = agreement(coarse, fine)
     held = min(digits, int(-mpmath.log10(max(differ, 1e-50))))

@@ -1,4 +1,4 @@
-"""What the formulas of rotation need of scalars: NumPy arrays with leading axes, or SymPy expressions.
+"""Operations on scalars that the formulas of rotation need: NumPy arrays with leading axes, or SymPy expressions.
 
 A formula is written once, on the entries of its vectors and matrices; an `Algebra` reads them from what was given and puts
 the result together. Numbers give NumPy arrays, anything of SymPy gives a SymPy matrix.

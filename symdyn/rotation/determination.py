@@ -1,8 +1,8 @@
 """Determination of Euler angles from R: two solutions, or at gimbal lock a whole family.
 
 R = R_i(a) R_j(b) R_k(c), l the axis that is neither i nor j, e = 1 if (i, j, l) is right-handed and -1 if not. Entries of R:
-a from column k; then M = R_i(a)^T R = R_j(b) R_k(c) has b in its column k and c in its row j. Whatever the rounding of a near
-lock, b and c fit to it, so that R comes back to the last digits at any distance from lock.
+a from column k; then M = R_i(a)^T R = R_j(b) R_k(c) has b in its column k and c in its row j. b and c fit to any rounding of a
+near lock, so that R comes back to the last digits at any distance from lock.
 """
 
 from __future__ import annotations

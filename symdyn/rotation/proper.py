@@ -18,7 +18,7 @@ ORTHOGONAL = 1e-9
 
 
 def rotation_matrix(algebra: Algebra, R: Any) -> Any:
-    """R (3, 3), or NotARotation. Of expressions with symbols only the shape is checked."""
+    """R (3, 3), or NotARotation. Only the shape of expressions with symbols is checked."""
     R = algebra.read(R, (3, 3), "R", NotARotation)
     if isinstance(algebra, Numbers):
         _check(R)

@@ -16,7 +16,7 @@ from symdyn.rotation.proper import rotation_matrix
 if TYPE_CHECKING:
     from symdyn.given import Array, Matrix
 
-# What of the size of R_dot R^T may not be skew-symmetric: as much as differences of R leave.
+# Part of the size of R_dot R^T that need not be skew-symmetric: as much as differences of R leave.
 RATE = 1e-6
 
 
@@ -28,10 +28,10 @@ def angular_velocity(R: Matrix, frame: str = "n", *, R_dot: Matrix | None = None
     frame   the components of omega: "n" or "b"
     R_dot   (3, 3), the derivative of R, instead of deriving it; needed for numbers, which may have leading axes
 
-    Products of sines and cosines are collected by sin^2 = 1 - cos^2 where that makes the result shorter. That symbols are
-    bound to each other, as Euler parameters by their norm, is not known here: see omega_from_parameters.
-    Raises NotARotation for numbers that are no rotation, ArgumentError if R has accelerations or inputs, which have no
-    derivative, numbers come without R_dot, or R_dot R^T of numbers is not skew-symmetric to 1e-6 of its size.
+    Products of sines and cosines are collected by sin^2 = 1 - cos^2 where that makes the result shorter. Relations between
+    symbols, as of Euler parameters by their norm, are not known here: see omega_from_parameters. Raises NotARotation for numbers
+    that are no rotation, ArgumentError if R has accelerations or inputs, which have no derivative, numbers come without R_dot, or
+    R_dot R^T of numbers is not skew-symmetric to 1e-6 of its size.
     Source: lecture, chapters 1.7 and 4.5.
 
     >>> q = sd.coordinates("q")

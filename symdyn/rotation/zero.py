@@ -7,9 +7,9 @@ from typing import Any
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-# Of 40 digits, those that cancellation may take.
+# Bound that leaves 15 of 40 digits to cancellation.
 _NOTHING, _DIGITS = sp.Float("1e-25"), 40
-# Of a SymPy Float of double precision.
+# Rounding of a SymPy Float of double precision.
 _ROUNDING = sp.Float("1e-14")
 
 

@@ -45,7 +45,7 @@ class Frames:
         return True
 
     def pose(self, name: str, line: int, what: str, waiting: tuple[str, ...] = ()) -> Pose:
-        """Of a frame in the model's."""
+        """Pose of a frame in the model's."""
         if name in self.poses:
             return self.poses[name]
         if name not in self.known:
@@ -63,7 +63,7 @@ class Frames:
         return result
 
     def between(self, outer: str, inner: str, line: int, what: str) -> Pose:
-        """Of one frame in another, without rounding where it is written so."""
+        """Pose of one frame in another, without rounding where it is written so."""
         if outer == inner:
             return Pose()
         known = self.known.get(inner)

@@ -1,4 +1,4 @@
-"""What the links of an SDF look like: its <visual> elements as shapes."""
+"""Visual shapes of the links of an SDF: its <visual> elements."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Visuals:
                                 color=color or piece.color)
 
     def _pose(self, visual: Element, link: SdfLink, model: SdfModel, what: str) -> Pose:
-        """Of a visual in its link; what it is relative to has a name within the link's model."""
+        """Pose of a visual in its link; the frame that it is relative to has a name within the link's model."""
         relative, pose, line = self.faults.pose(visual, what)
         inner, _, _ = link.name.rpartition("::")
         frame = f"{inner}::{relative}" if inner else relative

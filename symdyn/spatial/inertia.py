@@ -71,7 +71,7 @@ class ArticulatedInertia:
 
     @classmethod
     def rigid(cls, inertia: Inertia) -> ArticulatedInertia:
-        """Of a rigid body."""
+        """Inertia of a rigid body."""
         x, y, z = inertia.h
         m = inertia.m
         return cls(inertia.I, np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=object),

@@ -104,7 +104,8 @@ CHORDS = (3.5, 3.9, 4.6, 4.2, 3.7, 3.3, 2.9, 2.5, 2.1, 1.4)
 
 
 class Coefficients(NamedTuple):
-    """Of the six motions surge, sway, heave, roll, pitch, yaw about O, in body axes: the diagonals of 6 x 6 matrices."""
+    """Coefficients of the six motions surge, sway, heave, roll, pitch, yaw about O, in body axes: the diagonals of 6 x 6
+    matrices."""
 
     surge: float
     sway: float

@@ -47,7 +47,7 @@ _MODIFIED = (
 )
 _CONVENTIONS = {"standard": _STANDARD, "modified": _MODIFIED}
 
-# Of each motor: inertia Jm (kg m^2), gear ratio G, viscous friction B (N m s/rad) and Coulomb friction (N m) for
+# Data of each motor: inertia Jm (kg m^2), gear ratio G, viscous friction B (N m s/rad) and Coulomb friction (N m) for
 # positive and for negative speed, all on the motor's side of the gear.
 _MOTORS = (
     (0.0002, -62.6111, 0.00148, 0.395, -0.435),

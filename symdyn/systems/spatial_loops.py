@@ -10,8 +10,8 @@ from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
 
 X, Y, Z = [1, 0, 0], [0, 1, 0], [0, 0, 1]
-# Of each rod of the Bricard mechanism: the axis of its first joint, where it points to at the start, which of its principal
-# axes that is.
+# Data of each rod of the Bricard mechanism: the axis of its first joint, its direction at the start, the number of that principal
+# axis.
 _RODS = ((Y, (1, 0, 0), 0), (Z, (0, -1, 0), 1), (X, (0, 0, 1), 2), (Y, (-1, 0, 0), 0), (Z, (0, 1, 0), 1))
 
 

@@ -1,4 +1,4 @@
-"""What acts on the NREL 5-MW turbine: drives, water, mooring, wind and waves; see symdyn.systems.turbines."""
+"""Loads on the NREL 5-MW turbine: drives, water, mooring, wind and waves; see symdyn.systems.turbines."""
 
 from __future__ import annotations
 

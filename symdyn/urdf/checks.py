@@ -1,4 +1,4 @@
-"""What makes a robot of a file a tree: each joint carries one link, all hang on one root; and who mimics whom."""
+"""Checks that the robot of a file is a tree: each joint carries one link, all hang on one root; and who mimics whom."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Element:
 
 
 class _Builder:
-    """What takes elements from the parser."""
+    """Builder of elements from the parser."""
 
     def __init__(self) -> None:
         self.parser: Any = None
@@ -115,7 +115,7 @@ def read_document(path: Path, kind: str = "a URDF", given: bytes | None = None) 
 
 
 def _no_xml(reason: str, text: bytes, line: int, kind: str) -> str:
-    """What is wrong with text that is no XML."""
+    """Fault of text that is no XML."""
     reason = reason.partition(":")[0]
     if not text.strip():
         return f"the file is empty; pass {kind} file"
@@ -132,7 +132,7 @@ def _no_xml(reason: str, text: bytes, line: int, kind: str) -> str:
 
 
 def _not_utf8(text: bytes) -> str:
-    """Which byte of a text is not UTF-8; "" if it is."""
+    """First byte of a text that is not UTF-8; "" if it is."""
     try:
         text.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""What robots of files weigh: inertias that no body can have, and leaves that move without any."""
+"""Checks of inertias in files of robots: inertias that no body can have, and leaves that move without any."""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from symdyn.errors import MissingExtra
 
-# What a file may be long, bytes; how many triangles a mesh in a picture has at most, and into how many cells it is divided first.
+# Largest length of a file, bytes; largest number of triangles of a mesh in a picture, and number of cells that it is divided into
+# first.
 LONGEST, TRIANGLES, _CELLS = 64 * 2**20, 800, 40
 FORMATS = ("stl", "obj", "dae")
 # The unit of lengths in COLLADA, m, which trimesh leaves to its callers.
@@ -118,7 +119,7 @@ def _reduced(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.nda
 
 
 def box(half: np.ndarray) -> Triangles:
-    """Of half its edges, (3,)."""
+    """Box with half its edges given, (3,)."""
     vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5,
              7], [1, 7, 3]]

@@ -11,7 +11,7 @@ from symdyn.urdf.robot import INERTIA, TYPES, ZERO, Inertial, Link, Mimic, Origi
 from symdyn.urdf.values import FileFaults, Triple
 
 Named = TypeVar("Named", Link, UrdfJoint)
-# What an axis is where none is given.
+# Axis where none is given.
 AXIS: Triple = (1.0, 0.0, 0.0)
 # Elements that would contradict each other.
 ONCE = {"link": ("inertial",), "joint": ("origin", "parent", "child", "axis", "dynamics", "mimic"),
@@ -116,7 +116,7 @@ def _axis(element: Element, kind: str, what: str, faults: FileFaults) -> Triple:
     if length < 1e-12:
         faults.at(element.line if result is None else result.line, f"{what}: its axis is zero; give a direction")
         return AXIS
-    # What is a unit vector to rounding stays as it is written.
+    # A unit vector to rounding stays as it is written.
     return axis if abs(length - 1) < 1e-15 else (axis[0] / length, axis[1] / length, axis[2] / length)
 
 

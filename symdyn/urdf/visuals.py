@@ -1,4 +1,4 @@
-"""What the links of a URDF look like: its <visual> elements as shapes."""
+"""Visual shapes of the links of a URDF: its <visual> elements."""
 
 from __future__ import annotations
 

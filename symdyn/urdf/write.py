@@ -23,7 +23,7 @@ from symdyn.urdf.document import as_path
 from symdyn.urdf.parameters import Names
 from symdyn.urdf.robot import GRAVITY
 
-# What limits are where a type of joint must have some, m or rad, N or N m, m/s or rad/s.
+# Limits where a type of joint must have some, m or rad, N or N m, m/s or rad/s.
 _UNLIMITED = "1e+09"
 
 
@@ -59,7 +59,7 @@ class _Writer:
         missing = [p.name for p in model.parameters if p not in model.defaults]
         if missing:
             self.faults.append(f"there is no number for {', '.join(missing)}; add them to the defaults: a URDF holds numbers")
-        # Of each body the pose of its frame in that of its link, which sits at the joint.
+        # Pose of each body's frame in that of its link, which sits at the joint.
         self.poses = {-1: (np.eye(3), np.zeros(3))}
         self.owners = {q: j for j in model.joints for q in j.coordinates if isinstance(q, Coordinate)}
         self.following: dict[str, tuple[str, float, float]] = {}
