@@ -3,10 +3,10 @@
 Candidates are momenta dT/du_k; the components of linear and angular momentum of the whole, which are w . dT/du with the speeds w
 that move all bodies as one (Noether's theorem); T + V, or Jacobi's integral u . dL/du - L where motions are prescribed. Each is
 w . dT/du - ..., so that its rate along the motion is its rate at any accelerations less w . r, with what the equations make zero,
-r = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam. That this is zero for all states and accelerations is decided exactly, and that
-C_r w is zero or, for w = u, C_t, which is -C_r u where the constraints hold. Momenta of the whole are written by the sums over
-the bodies, which divide by nothing, also where w has poles, such as at gimbal lock; the proof holds there by continuity.
-Source: Goldstein, Poole, Safko, Classical Mechanics, 3rd ed., sections 2.6, 2.7 and 13.7.
+r = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam. Exact algebra decides whether this is zero for all states and accelerations,
+and whether C_r w is zero or, for w = u, C_t, which is -C_r u where the constraints hold. Momenta of the whole are written by the
+sums over the bodies, which divide by nothing, also where w has poles, such as at gimbal lock; the proof holds there by
+continuity. Source: Goldstein, Poole, Safko, Classical Mechanics, 3rd ed., sections 2.6, 2.7 and 13.7.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Conserved:
 
 @dataclass(frozen=True, repr=False)
 class ConservedQuantities:
-    """What every motion keeps; a sequence of Conserved that prints as a list, and by name: found["energy"].
+    """Quantities that every motion conserves; a sequence of Conserved that prints as a list, and by name: found["energy"].
 
     cyclic   coordinates that neither T and V hold nor the loads and constraints
     notes    what changes the momenta of cyclic coordinates and the energy, coordinates that stand in loads or constraints alone,
@@ -261,7 +261,7 @@ class _Search:
     # -- verdicts
 
     def claims(self, c: _Candidate) -> list[Any]:
-        """What must be equal for all states and accelerations, pairs one after the other."""
+        """Sides that must be equal for all states and accelerations, pairs one after the other."""
         rate = [*self.m.rate([c.value]), inner(c.w, self.residual)]
         held: list[Any] = []
         if self.equations.constraints:
@@ -336,7 +336,7 @@ class _Search:
             return ""
 
     def why_no_energy(self, energy: _Candidate) -> str:
-        """What changes T + V."""
+        """Terms that change T + V."""
         if self.by_hand:
             return "energy: T changes by the power of the forces, of which it is not known whether they have a potential"
         rate, work, *held = self.claims(energy)

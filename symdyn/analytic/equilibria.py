@@ -4,8 +4,8 @@ Conditions are polynomials in coordinates outside of angles and in sine and cosi
 split into factors, each of which is a case; equations for a single unknown are solved: a s + b c + d = 0 by
 q = atan2(a, b) +- acos(-d / r) with r^2 = a^2 + b^2, those in one cosine by their roots, with numbers of any degree by
 resultants; what stands linearly is eliminated. Equations with numbers that stay coupled become triangular by a Groebner basis.
-What none of this solves is an error: a result holds all equilibria for parameters at which what it assumes not to be zero is not.
-Source: Cox, Little, O'Shea, Ideals, Varieties, and Algorithms, chapters 3 and 6.
+A case that none of this solves is an error: a result holds all equilibria for parameters at which the quantities assumed not to
+be zero are not. Source: Cox, Little, O'Shea, Ideals, Varieties, and Algorithms, chapters 3 and 6.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _positive(seconds: Any, name: str) -> float:
 
 @dataclass(frozen=True)
 class _Case:
-    """What is still to be zero, and what is found: unknown -> value, with sines and cosines, angles, conditions."""
+    """Equations that remain, and the unknowns found: unknown -> value, with sines and cosines, angles, conditions."""
 
     left: tuple[sp.Expr, ...]
     found: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
@@ -231,7 +231,7 @@ class _Search:
         self.start = _Case(tuple(polynomials))
 
     def _name_letters(self) -> None:
-        """What generators of the ring are in the polynomials. Raises SymdynError where unknowns stand elsewhere."""
+        """Name the generators of the ring in the polynomials. Raises SymdynError where unknowns stand elsewhere."""
         exact, name = self.exact, self.equations.name
         used = {k for v in exact.values for p in (v.num, *[exact.ring.factors[f] for f, _ in v.under])
                 for k, degree in enumerate(p.degrees()) if degree > 0}  # of zero they are -1
@@ -351,7 +351,7 @@ class _Search:
         """Factors that hold unknowns, each once; those in parameters are taken not to be zero."""
         if e not in self._split:
             own = []
-            # What was eliminated linearly leaves divisors in parameters, which are taken not to be zero.
+            # Linear elimination leaves divisors in parameters, which are taken not to be zero.
             for f, _ in sp.factor_list(sp.fraction(sp.together(e))[0])[1]:
                 if f.free_symbols & self._names:
                     own.append(f)

@@ -127,7 +127,7 @@ class Mechanics:
 
     @property
     def coupled(self) -> int:
-        """How many speeds the largest block of the mass matrix connects."""
+        """Number of speeds that the largest block of the mass matrix connects."""
         return max(map(len, blocks(self.equations.quantity("M_tilde"))), default=0)
 
     def demand_closed(self, what: str, instead: str) -> None:

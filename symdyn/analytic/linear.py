@@ -133,7 +133,7 @@ class Linearized:
     def _shortest(self, entries: list[Any]) -> list[sp.Expr]:
         result = written(entries, self.symbols, bound=BOUND)
         if any(value.has(sp.acos, sp.asin, sp.atan, sp.atan2) for value in self.about.values()):
-            # What became of sines of these angles is combined.
+            # Expressions with sines of these angles are combined.
             nodes, symbols = recorded([sp.expand_trig(e) for e in result])
             result = written(nodes, symbols, bound=BOUND)
         return result
@@ -251,7 +251,7 @@ class Linearized:
 
 
 class _Values:
-    """What stands for coordinates: expressions in parameters, of the mechanism or new ones, on the tape."""
+    """Values that stand for coordinates: expressions in parameters, of the mechanism or new ones, on the tape."""
 
     def __init__(self, name: str, recorder: Any, symbols: dict[Node, sp.Symbol]) -> None:
         self.name, self.recorder, self.symbols = name, recorder, symbols
@@ -300,7 +300,7 @@ def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hol
 
 
 class State:
-    """What is inserted for coordinates, speeds, extra states and inputs of equations, on their tape.
+    """Values inserted for coordinates, speeds, extra states and inputs of equations, on their tape.
 
     about      symbol -> value; values: leaf -> node, of what is given; symbols: leaf -> symbol of a parameter
     drifting   coordinates whose speed is not zero; held: indices of speeds that are held; multipliers: leaves of them
@@ -412,7 +412,8 @@ class _Linearization:
         return np.array(columns, dtype=object).T.reshape(len(entries), len(leaves)) if columns else zeros(len(entries), 0)
 
     def _constrained(self, r: np.ndarray, N: np.ndarray, free: Sequence[int]) -> tuple[Reduced, list[Any]]:
-        """What the constraints leave free, and what makes the speeds fulfil them and stay; the multipliers become values."""
+        """Freedoms that the constraints leave, and conditions for speeds that fulfil them and stay; the multipliers become
+        values."""
         m, equations, lam = self.m, self.equations, self.state.multipliers
         rates, second = m.constraint_rates()
         C = m.statics()[1]

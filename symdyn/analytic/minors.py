@@ -33,7 +33,7 @@ def determinant(rows: Any, add: Callable[[Any, Any], Any] = lambda a, b: a + b,
     known: dict[tuple[int, ...], Any] = {(): one}
 
     def minor(columns: tuple[int, ...]) -> Any:
-        """Of the last rows and these columns."""
+        """Minor of the last rows and these columns."""
         if columns not in known:
             row, total = rows[order[n - len(columns)]], zero
             for k, column in enumerate(columns):

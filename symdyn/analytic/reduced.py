@@ -37,7 +37,7 @@ DIGITS = 30
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """What the constraints leave free.
+    """Freedoms that the constraints leave.
 
     displacements, speeds   indices of the independent ones, of all speeds; dependent: of the speeds that the others determine
     Z_v (n_u, n_d), Z_u (n_u, n_s), Z_w (n_u, n_d), E (n_d, n_s), W (n_d, n_d)   see above

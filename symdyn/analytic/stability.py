@@ -144,7 +144,7 @@ def _times(p: Polynomial, q: Polynomial) -> Polynomial:
 
 
 def _negative_and_real(b: Sequence[Any]) -> list[Any]:
-    """Of b_0 + b_1 x + ..., with b_m > 0: what is positive where all roots x are real, negative and different."""
+    """Quantities that are positive where all roots x of b_0 + b_1 x + ..., with b_m > 0, are real, negative and different."""
     if len(b) == 3:
         return [b[0], b[1], b[1] * b[1] - 4 * b[0] * b[2]]
     if len(b) == 4:
@@ -154,7 +154,7 @@ def _negative_and_real(b: Sequence[Any]) -> list[Any]:
 
 
 def _lienard_chipart(a: Sequence[Any]) -> list[Any]:
-    """Of a_0 s^n + ... + a_n, with a_0 > 0: what is positive where all roots have negative real parts."""
+    """Quantities that are positive where all roots of a_0 s^n + ... + a_n, with a_0 > 0, have negative real parts."""
     n = len(a) - 1
 
     def hurwitz(k: int) -> Any:

@@ -24,7 +24,7 @@ ENERGY, POWER, SECOND = (parsed(unit) or {} for unit in ("J", "W", "s"))
 
 @dataclass(frozen=True, repr=False)
 class UnitReport:
-    """What dimensional analysis of equations found; true where all units agree.
+    """Result of dimensional analysis of equations; true where all units agree.
 
     faults     in words: sums of what has different units, entries that have another unit than the equations give them
     units      name of a quantity -> units of its entries, nested like it

@@ -1,4 +1,4 @@
-"""What is wrong, or special, with the constraints of a mechanism: System.diagnose."""
+"""Faults and special cases of the constraints of a mechanism: System.diagnose."""
 
 from symdyn.diagnosis.examine import diagnose
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState

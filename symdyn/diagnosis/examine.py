@@ -41,7 +41,7 @@ STARTS = 12
 
 def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, coordinates: str = "relative",
              reach: float = REACH) -> Diagnosis:
-    """What the constraints of a system do; see System.diagnose."""
+    """Diagnosis of the constraints of a system; see System.diagnose."""
     from symdyn.formulation.constraints.absolute import in_absolute_coordinates
     from symdyn.formulation.constraints.absolute_start import absolute_start
     from symdyn.formulation.constraints.augmented import COORDINATES, ConstrainedTree

@@ -1,4 +1,4 @@
-"""Which bodies move in the motions that constraints leave: parts on their own, idle rotations, motions without mass."""
+"""Bodies that move in the motions that constraints leave: parts on their own, idle rotations, motions without mass."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def mobility(free: Sequence[np.ndarray], J: np.ndarray, M: np.ndarray, F: np.nda
 
 
 def _coupled(T: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which bodies have no motions of their own; which move at all: by the projector on all motions of bodies."""
+    """Masks of the bodies without motions of their own, and of those that move at all: by the projector on all motions of
+    bodies."""
     U, sizes, _ = np.linalg.svd(T, full_matrices=False)
     kept = sizes > TOLERANCE * max(sizes.max(initial=0.0), 1e-300)
     P = U[:, kept] @ U[:, kept].T

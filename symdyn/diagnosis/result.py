@@ -49,7 +49,7 @@ class SingularState:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the constraints of a mechanism do; prints as text.
+    """Diagnosis of the constraints of a mechanism; prints as text.
 
     speeds, rows   numbers of speeds, and of constraint rows with those that hold by structure
     gruebler       how the count of freedoms comes about, a line for each kind; by_count: its result, speeds less rows

@@ -268,7 +268,7 @@ class _Balance:
         self.least = float((acting * self.scales).max(initial=0.0))
 
     def forces(self, point: OperatingPoint) -> np.ndarray:
-        """What the sought inputs, as they are, contribute, if linear; (n_u,)."""
+        """Forces of the sought inputs, as they are, if linear; (n_u,)."""
         result: np.ndarray = self.matrix(point) @ point.inputs[self.free]
         return result
 
@@ -409,7 +409,7 @@ def _demand_linear(balance: _Balance, drive: _Drive) -> None:
 
 
 class _Drive:
-    """What inputs do along the freedoms: R (freedoms, n)."""
+    """Effect of inputs along the freedoms: R (freedoms, n)."""
 
     def __init__(self, R: np.ndarray) -> None:
         self.R = R

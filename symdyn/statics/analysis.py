@@ -1,4 +1,4 @@
-"""What constant linear equations about a state say: eigenvalues with proof, verdict, modes, and why."""
+"""Analysis of constant linear equations about a state: eigenvalues with proof, verdict, modes, and why."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Analysis:
         return reason(self.spectrum)
 
     def driven(self, right: np.ndarray, left: np.ndarray, turned: np.ndarray | None = None, error: float = 0.0) -> np.ndarray:
-        """What damping, circulatory forces and extra states that are more than rounding do to each mode, without their signs.
+        """Effect on each mode of damping, circulatory forces and extra states that are more than rounding, without their signs.
 
         turned   S of a change of variables, known to `error` (1/s): damping and stiffness in the variables that it makes constant
         """
@@ -113,7 +113,7 @@ def _beyond(values: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def shapes_of(manifold: Manifold) -> Shapes:
-    """What names the modes of a manifold."""
+    """Shapes that name the modes of a manifold."""
     sizes = (manifold.n_d, manifold.n_s, len(manifold.states))
     displaced = (manifold.Z_v, manifold.labels)
     if manifold.Z_u is manifold.Z_v:

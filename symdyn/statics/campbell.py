@@ -395,21 +395,21 @@ def _names(tracks: Sequence[dict[int, Mode]], values: np.ndarray) -> tuple[str, 
 
 
 def _sense(modes: Sequence[Mode]) -> str:
-    """Which way the displacements of a mode go round the axis of the rotor, if they do, in the mean over the speeds."""
+    """Sense in which the displacements of a mode go round the axis of the rotor, if they do, in the mean over the speeds."""
     translation, tilt = np.mean([mode.whirls for mode in modes], axis=0)
     sense = sense_of(float(np.mean([mode.whirl for mode in modes])), (float(translation), float(tilt)))
     return f" {sense}" if sense else ""
 
 
 def _whirl(track: dict[int, Mode], stem: str, values: np.ndarray) -> str:
-    """Which way the pattern of a set of blades goes round, with the rotor or against it, seen from the fixed frame, if it
+    """Sense in which the pattern of a set of blades goes round, with the rotor or against it, seen from the fixed frame, if it
     does."""
     turning, total = np.sum([_pattern(mode, stem, float(values[k])) for k, mode in track.items()], axis=0)
     return sense_of(float(turning / total), (0.0, 0.0)) if total else ""
 
 
 def _pattern(mode: Mode, stem: str, speed: float) -> tuple[float, float]:
-    """How much the pattern of a set of blades goes round, with the rotor positive, and what that is of a round whirl."""
+    """Amount by which the pattern of a set of blades goes round, with the rotor positive, and its part of a round whirl."""
     c, s = (mode.coordinates.index(f"{stem} {part}") for part in ("cosine", "sine"))
     turning = -float(np.imag(mode.shape[c].conj() * mode.shape[s])) * (1.0 if speed >= 0 else -1.0)
     return turning, float(np.sum(np.abs(mode.shape[[c, s]])**2)) / 2

@@ -128,8 +128,8 @@ class Rows(NamedTuple):
 
 
 def contact_rows(point: OperatingPoint) -> Rows | None:
-    """What the closed contacts of a point hold; None: nothing. J of the rows, D = J B with B = M^-1 J^T, and the accelerations
-    J u_dot + b with b = free - J u_dot_open give their derivatives at given u_dot."""
+    """Rows that the closed contacts of a point hold; None: nothing. J of the rows, D = J B with B = M^-1 J^T, and the
+    accelerations J u_dot + b with b = free - J u_dot_open give their derivatives at given u_dot."""
     module, p = point.module, point.p
     if not module.metadata.contacts:
         return None

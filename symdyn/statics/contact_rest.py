@@ -42,11 +42,11 @@ SHORTEST = 1e-3
 WITHIN, ROUNDS = 1e-10, 20
 # The same where the end of a range is looked for.
 EDGE = 1e-13
-# What planes may leave of a cone in space, by the largest force.
+# Part of a cone in space that planes may leave, by the largest force.
 CONE = 1e-9
 # Sides of a cone at first, and constraints that hold with equality to this part.
 SIDES, ACTIVE = 8, 1e-6
-# How often a range is doubled, and halved at its end.
+# Number of times that a range is doubled, and halved at its end.
 DOUBLED, HALVED = 60, 200
 
 
@@ -144,8 +144,8 @@ class Rest:
 
     @property
     def verdict(self) -> str:
-        """That of the linear equations: "stable", "neutral", "drifts", "unstable" or "not decided", "" where nothing is free to
-        move; "not decided" as well where contacts that touch carry nothing or are at the edge of their cones, since small
+        """Verdict on the linear equations: "stable", "neutral", "drifts", "unstable" or "not decided", "" where nothing is free
+        to move; "not decided" as well where contacts that touch carry nothing or are at the edge of their cones, since small
         disturbances change their modes.
 
         >>> x, y = sd.coordinates("x y")
@@ -401,7 +401,7 @@ class _Forces:
         return float(self.best[row] + self.free[row] @ y) if y is not None else -side * float("inf")
 
     def fault(self) -> str:
-        """Which contacts are beyond their cones."""
+        """Contacts beyond their cones."""
         result = []
         for k, own in enumerate(self.rows):
             if own[0] in self.held:

@@ -44,9 +44,8 @@ LOOKS = (0.13, 0.31, 0.47, 0.71, 0.89)
 NOTHING = 1e-10
 # Error of the motion, per unit; while a closed one is looked for.
 PRECISE, ROUGH = 1e-12, 1e-8
-# What is left of a periodic motion after its period, of the size of its coordinates and speeds, before the last of Newton's
-# steps,
-# and before the motion is followed precisely; the number of steps, and the largest.
+# Difference of a periodic motion after its period, relative to the size of its coordinates and speeds, before the last of
+# Newton's steps and before the motion is followed precisely; the number of steps, and the largest.
 CLOSED, NEARLY, ITERATIONS, LARGEST_STEP = 1e-9, 1e-4, 25, 0.5
 # Where the period is searched for: the largest part by which a step changes it, and the factor by which it may leave the guess.
 LARGEST_CHANGE, FURTHEST = 0.2, 5.0
@@ -385,7 +384,7 @@ def _flow(manifold: Manifold, point: OperatingPoint) -> np.ndarray:
 
 
 def _cyclic(course: Course) -> np.ndarray:
-    """Which coordinates of the manifold are displacements on which nothing depends, (m,)."""
+    """Mask of the coordinates of the manifold that are displacements on which nothing depends, (m,)."""
     scale = _sizes(course)
     T = course.widened(np.eye(len(scale)))
     wide = np.abs(T) @ scale if course.bundled else scale
@@ -413,7 +412,7 @@ def _left_open(course: Course) -> np.ndarray:
 
 
 def _sizes(course: Course) -> np.ndarray:
-    """What changes of the coordinates of the manifold are compared with: 1 rad or the natural length, by the period, (m,)."""
+    """References for changes of the coordinates of the manifold: 1 rad or the natural length, by the period, (m,)."""
     manifold = course.first
     sizes = natural_scales(manifold.point) * natural_length(manifold.point)
     return np.concatenate([sizes[manifold.displacements], sizes[manifold.speeds] * 2 * np.pi / course.period,

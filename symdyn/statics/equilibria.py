@@ -174,7 +174,7 @@ def _random(first: OperatingPoint, selection: Selection, count: int, ranges: Any
 
 
 def _spans(first: OperatingPoint, ranges: Any) -> dict[str, tuple[float, float]]:
-    """Of what moves along each speed; and of coordinates whose rates are no speeds, where they are named."""
+    """Ranges along each speed; and of coordinates whose rates are no speeds, where they are named."""
     module = first.module
     metadata = module.metadata
     labels = coordinate_names(metadata)

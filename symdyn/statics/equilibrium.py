@@ -55,7 +55,7 @@ class Judged:
 
 
 def judge(manifold: Manifold) -> Judged:
-    """What small disturbances of a steady state do; raises nothing."""
+    """Verdict on small disturbances of a steady state; raises nothing."""
     try:
         singular = singular_configuration(manifold.point, manifold.selection)
         if singular:

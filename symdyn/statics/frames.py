@@ -4,8 +4,8 @@ Where a rotor is alike at every azimuth (an axisymmetric body, three or more lik
 constant
 S: y = e^(St) w gives w_dot = (A(0) - S) w with constant coefficients. S follows from dA/dt = S A - A S at many azimuths by least
 squares; it must be a generator of rotations, with eigenvalues that are whole multiples of i times the speed, and A(t) computed
-from it must be that of the mechanism at all azimuths: this is the proof. Of blades e^(St) is the multi-blade transformation, of a
-free body it turns body axes into fixed ones. Where several S do, that one is taken which leaves the displacements of the
+from it must be that of the mechanism at all azimuths: this is the proof. For blades e^(St) is the multi-blade transformation; for
+a free body it turns body axes into fixed ones. Where several S do, that one is taken which leaves the displacements of the
 bodies, in fixed axes, as constant as can be.
 Source: Coleman and Feingold, NACA Report 1351 (1958); Lyapunov, The General Problem of the Stability of Motion (reducible
 systems); Skjoldan and Hansen, J. Sound Vib. 327 (2009), on the principal frequency.
@@ -23,7 +23,7 @@ from symdyn.statics.manifold import Manifold, natural_length
 
 # Azimuths that S is found from; its error, and that of the proof, relative to the size of A.
 AZIMUTHS, PROVED = 8, 1e-9
-# What is not known of the entries of S, as a part of the speed.
+# Uncertainty of the entries of S, as a part of the speed.
 ROUNDED = 1e-12
 # Eigenvalues of S are whole multiples of the speed to this.
 WHOLE = 1e-6
@@ -160,7 +160,7 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
 
 
 def _rows_that_do_not_spin(manifold: Manifold) -> np.ndarray:
-    """Which rows of J belong to bodies that do not spin."""
+    """Mask of the rows of J of bodies that do not spin."""
     speeds = spinning(manifold)
     per_body = 3 if manifold.point.module.metadata.planar else 6
     return np.asarray(np.repeat(speeds <= 1e-9 * max(float(speeds.max(initial=0.0)), 1e-300), per_body))

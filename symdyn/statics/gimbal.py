@@ -45,7 +45,7 @@ def demand_no_lock(point: OperatingPoint, what: str) -> None:
 
 
 def independence(point: OperatingPoint) -> float:
-    """How independent the motions are that coordinates bring about, from 0 to 1: by the mass matrix scaled to a diagonal of ones,
+    """Independence of the motions that coordinates bring about, from 0 to 1: by the mass matrix scaled to a diagonal of ones,
     without what has no mass, and by the reciprocal condition of N with unit columns."""
     try:
         M, N = point.evaluate("mass_matrix"), point.evaluate("N")

@@ -1,8 +1,8 @@
 """States where the equations have a kink or a jump, such as dry friction at rest or the edge of a contact: no linear ones exist.
 
-The balance is evaluated at a few steps to both sides, coordinate by coordinate, speed by speed, and so on. Of a smooth function
-the slopes on both sides differ by less and less, in proportion to the step; at a kink they differ by the same at each step, and
-at a jump the values do. Rounding does neither: what it makes of the values is measured where they are the same but for it, and by
+The balance is evaluated at a few steps to both sides, coordinate by coordinate, speed by speed, and so on. The slopes of a smooth
+function on both sides differ by less and less, in proportion to the step; at a kink they differ by the same at each step, and at
+a jump the values do. Rounding does neither: what it makes of the values is measured where they are the same but for it, and by
 data that differ in their last digit, since large terms that cancel, such as those of stiff springs, leave their own.
 """
 
@@ -25,7 +25,8 @@ SPREAD = (1.0, 1.0 + 1e-12, 1.0 - 1e-12)
 
 
 def kink(point: OperatingPoint, selection: Selection) -> str:
-    """What passes its value where the equations have a kink or a jump at a state with accelerations, as "x"; "" for none."""
+    """Quantity that passes its value where the equations have a kink or a jump at a state with accelerations, as "x"; "" for
+    none."""
     metadata = point.module.metadata
     coordinates, speeds = held_indices(point, selection)
     held = {metadata.q[k] for k in coordinates} | {f"{metadata.q[k]}_dot" for k in coordinates}
@@ -36,7 +37,7 @@ def kink(point: OperatingPoint, selection: Selection) -> str:
 
 
 def no_linear_equations(name: str) -> str:
-    """What to say of such a state; name: what passes its value."""
+    """Message about such a state; name: the quantity that passes its value."""
     return (f"the equations have a kink or a jump at this state, where {name} passes its value, so that there are no linear "
             "ones; take another state, or a smooth law such as tanh(x/eps) in place of sign(x)")
 
@@ -67,7 +68,7 @@ def _breaks(point: OperatingPoint, k: int) -> bool:
 
 
 def _noise(point: OperatingPoint, k: int, step: float) -> np.ndarray:
-    """What data that differ in their last digit make of the balance, on both sides of the value of entry k."""
+    """Change of the balance by data that differ in their last digit, on both sides of the value of entry k."""
     stream = np.random.default_rng(0)
     result = []
     for way in (step, -step):
@@ -79,6 +80,6 @@ def _noise(point: OperatingPoint, k: int, step: float) -> np.ndarray:
 
 
 def _constant(rows: np.ndarray) -> np.ndarray:
-    """Which columns are the same in all rows, but for a part."""
+    """Mask of the columns that are the same in all rows, but for a part."""
     result: np.ndarray = np.ptp(rows, axis=0) <= SAME * np.abs(rows).max(axis=0)
     return result

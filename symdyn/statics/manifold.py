@@ -327,7 +327,8 @@ class Manifold:
 
 
 def _left(rows: np.ndarray, result: np.ndarray, asked: np.ndarray, *products: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Which columns of rows @ found + asked + the products are not zero, by the sizes of their terms, (n_in,) of bool."""
+    """Mask of the columns of rows @ found + asked + the products that are not zero, by the sizes of their terms, (n_in,) of
+    bool."""
     left, size = rows @ result + asked, np.abs(asked)
     for factor, other in products:
         left, size = left + factor @ other, size + np.abs(factor) @ np.abs(other)
@@ -423,7 +424,7 @@ def _basis(point: OperatingPoint, rows: np.ndarray, independent: Sequence[int] |
     if not Z.shape[1]:
         return Z, []
     result = Z @ np.linalg.inv(block)
-    # What rounding leaves of a zero would couple what is independent by structure, and count as not known in every matrix.
+    # The rounding of a zero would couple quantities that are independent by structure, and count as uncertain in every matrix.
     sizes = np.abs(result / scales[:, None] * scales[list(independent)])
     result[sizes <= DUST * sizes.max()] = 0.0
     result[list(independent)] = np.eye(len(block))
@@ -437,7 +438,7 @@ def natural_scales(point: OperatingPoint) -> np.ndarray:
 
 
 def natural_length(point: OperatingPoint) -> float:
-    """What makes velocities of angular ones: the largest radius of inertia, m; 1 without lengths."""
+    """Length that makes velocities of angular ones: the largest radius of inertia, m; 1 without lengths."""
     turns = turning(point.module)
     masses = np.diag(point.M)
     if turns.all() or not turns.any() or masses[~turns].max(initial=0.0) <= 0:

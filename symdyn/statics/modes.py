@@ -23,7 +23,7 @@ SAME = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """What names eigenvectors of states [eta; zeta; z']: their kinetic energy and the speeds that they move.
+    """Shapes that name eigenvectors of states [eta; zeta; z']: their kinetic energy and the speeds that they move.
 
     M            (n, n) of what carries the energy, and Z (n_u, n) that gives all speeds from it: of eta where there are as many
                  displacements as speeds, else of zeta (`by_speeds`)
@@ -40,7 +40,7 @@ class Shapes:
     by_speeds: bool = False
 
     def amplitudes(self, right: np.ndarray) -> np.ndarray:
-        """Of an eigenvector (m,), what carries the energy, (n,): displacements, or speeds where these alone move."""
+        """Amplitudes of an eigenvector (m,) that carry the energy, (n,): displacements, or speeds where these alone move."""
         n_d, n_s, _ = self.sizes
         eta, zeta = right[:n_d], right[n_d:n_d + n_s]
         if self.by_speeds:
@@ -85,7 +85,7 @@ class Mode:
 
     @property
     def sense(self) -> str:
-        """Which way the mode goes round with respect to the rotation, seen from the fixed frame; see `sense_of`.
+        """Sense in which the mode goes round with respect to the rotation, seen from the fixed frame; see `sense_of`.
 
         >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
         >>> linear.modes()[0].sense
@@ -125,7 +125,7 @@ class Mode:
 
     @property
     def period(self) -> float:
-        """That of the damped oscillation, s; infinite for real eigenvalues.
+        """Period of the damped oscillation, s; infinite for real eigenvalues.
 
         >>> linear = sd.systems.pendulum().compile(backend="numpy").linearize({"q1": 0.0}, params={"l": 9.81})
         >>> round(linear.modes()[0].period / np.pi, 9)

@@ -121,7 +121,7 @@ class Averaged:
 
     @property
     def shapes(self) -> Shapes:
-        """What names its modes."""
+        """Shapes that name its modes."""
         n = len(self.M)
         return Shapes(self.M, np.eye(n), (n, n, 0), self.labels, (), (np.eye(n), self.labels))
 

@@ -1,4 +1,4 @@
-"""What is not known of the linear equations: their entries at data that differ by rounding.
+"""Uncertainty of the linear equations: their entries at data that differ by rounding.
 
 State, parameters and inputs are doubles, known to a unit in their last place at best. The matrices are formed again from data
 that differ by so much, at random, with the accelerations that belong to them: entries that are zero by structure stay zero,
@@ -29,7 +29,7 @@ FLOOR = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What is not known of A; bounds, entry by entry, of C and K."""
+    """Uncertainty of A; bounds, entry by entry, of C and K."""
 
     A: Unknown
     C: np.ndarray
@@ -103,7 +103,7 @@ def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inner, M = np.abs(manifold.Z_u.T), np.abs(point.M)
     Z_v, Z_u, W, W_z = (np.abs(each) for each in (manifold.Z_v, manifold.Z_u, manifold.W, manifold.W_z))
     demanded = [ENTRIES * EPSILON * M @ np.abs(each) for each in manifold.demanded]
-    # What is not known of the bases enters from both sides.
+    # The uncertainty of the bases enters from both sides.
     of_v, of_u, of_W, of_W_z = _of_bases(manifold)
     full_v, full_u = np.abs(point.by_v[forces]), np.abs(point.by_u[forces])
     full_z = np.abs(point.by_z[forces][:, manifold.states])

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Newton's steps; the largest part by which one changes the period, how often one is halved.
 ITERATIONS, LARGEST, HALVINGS = 50, 0.2, 8
-# What is left after a period, of the size of the motion, by the tolerance of its steps.
+# Difference after a period, relative to the size of the motion, in tolerances of its steps.
 CLOSED = 1e3
 # Singular values of Newton's matrix that do not count: where periodic motions of other energies are near, more of them.
 LEFT_OUT = (1e-9, 1e-4)
@@ -49,9 +49,9 @@ TANGENT = 1e-6
 SAMPLES, PERIODIC = 38, 1e-6
 # Number of times at which a motion is kept whose right-hand side may jump.
 TIMES_WITH_JUMPS = 201
-# What is said of initial values that nothing depends on, such as those of a coordinate that is prescribed: nothing is wrong.
+# Beginning of warnings about initial values that nothing depends on, such as those of a prescribed coordinate: nothing is wrong.
 IDLE = "nothing in this motion depends on"
-# What a change of a cyclic coordinate may change of the rest, by its size.
+# Largest change of the rest by a change of a cyclic coordinate, relative to its size.
 CYCLIC = 1e-6
 
 
@@ -305,12 +305,12 @@ class _Problem:
         return self.free and self.way(motion.x, motion.period) <= max(STILL * first, AT_REST * self.enough(motion.x, motion.x))
 
     def way(self, x: np.ndarray, period: float) -> float:
-        """What a start changes in a period at its rate, the largest entry."""
+        """Change of a start in a period at its rate, the largest entry."""
         modes = self.solution(x, period, 2)._phases
         return float(np.abs(self.keeps * self.rate(self.t, x, modes[0].p if modes else self.p)).max() * period)
 
     def nearest(self, x: np.ndarray, period: float, fixed: bool) -> PeriodicMotion:
-        """What comes back near a start and a period, by Newton's method; fixed: the start stays, its period is sought."""
+        """Periodic motion near a start and a period, by Newton's method; fixed: the start stays, its period is sought."""
         x = self.start(x)
         here = self.shot(x, period)
         scale, enough = _size(x, here.end), self.enough(x, here.end)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NOTHING = 1e-9
 # Eigenvalues within this part of the size of A neither decay nor grow: a double one is known to the root of rounding only.
 NEUTRAL = 1e-7
-# What the solution of Riccati's equation may leave, as a part of its terms.
+# Largest residual of a solution of Riccati's equation, as a part of its terms.
 SOLVED = 1e-6
 # States that a message names: those with this share of the square of a mode.
 SHARE = 0.05

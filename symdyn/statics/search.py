@@ -25,7 +25,7 @@ from symdyn.tape.intrinsics import RANK
 LARGEST_TURN = 0.5
 # Scaled steps that are none any more, and scaled residuals that are small enough.
 STEP, SOLVED = 1e-10, 1e-9
-# Of a Newton step this short nothing is left to gain; longer ones are taken while they still shrink.
+# A Newton step this short gains nothing; longer ones are taken while they still shrink.
 ROUNDED = 1e-15
 # Rows are scaled up by at most the inverse of this: what is left of stiffness below is rounding. Less so under constraints, whose
 # multipliers are found from scaled rows.
@@ -130,8 +130,8 @@ class Search:
         return np.concatenate([along, [abs(v) or 1.0 for v in trial.point.z[self.selection.states]], self.unknown])
 
     def _unknown_widths(self, trial: Trial) -> np.ndarray:
-        """Of parameters and inputs: what acts like one unit of motion against the stiffness, that of what is kept included; their
-        own size, or 1, where there is none."""
+        """Changes of parameters and inputs that act like one unit of motion against the stiffness, with that of what is kept;
+        their own size, or 1, where there is none."""
         point, n_u = trial.point, trial.point.sizes[1]
         stiffness = np.abs((trial.tested.T @ point.by_v[:n_u]) * self.columns).max(axis=1, initial=0.0)
         stiff = stiffness > FLOOR * stiffness.max(initial=0.0)
@@ -143,10 +143,10 @@ class Search:
         return np.array(widths)
 
     def allowed(self, trial: Trial) -> np.ndarray:
-        """How much force may be left along each speed, (n_u,): a small part of the forces that act there, taken one by one.
+        """Force that may be left along each speed, (n_u,): a small part of the forces that act there, taken one by one.
 
-        What acts is measured by the change of the forces with the logarithm of every parameter, by pulls of constraints, and,
-        for rounding, by the stiffness.
+        The acting forces are measured by the change of the forces with the logarithm of every parameter, by pulls of constraints,
+        and, for rounding, by the stiffness.
         """
         point, names = trial.point, self.module.metadata
         n_u = point.sizes[1]

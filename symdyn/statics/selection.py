@@ -1,4 +1,4 @@
-"""What is solved for and what is kept: coordinates, speeds, extra states, parameters and inputs by name."""
+"""Quantities that are solved for and those that are kept: coordinates, speeds, extra states, parameters and inputs by name."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ class Selection:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """What forces hold when the state is disturbed: what stays, unless its own equation is fulfilled without (conditions)."""
+        """Quantities that forces hold when the state is disturbed: those that stay, unless their own equation is fulfilled
+        without (conditions)."""
         if self.holding is not None:
             return self.holding
         return tuple(n for n in self.kept if n not in self.conditions)

@@ -1,4 +1,4 @@
-"""How equilibria and eigenvalues change with parameters, exactly.
+"""Exact derivatives of equilibria and eigenvalues by parameters.
 
 The equilibrium by the implicit function theorem; a simple eigenvalue of A x = lambda E x by its left eigenvector y,
     lambda' = y^H (A' - lambda E') x / (y^H E x),
@@ -67,7 +67,7 @@ def shift(point: OperatingPoint, selection: Selection, parameter: str) -> dict[s
 
 
 def of_eigenvalue(reduced: Manifold, spectrum: Spectrum, mode: Mode, changes: Mapping[str, float]) -> Sensitivity:
-    """Of the eigenvalue of a mode of a manifold's spectrum, for the direction `changes`."""
+    """Sensitivity of the eigenvalue of a mode of a manifold's spectrum, for the direction `changes`."""
     point, n, value = reduced.point, reduced.n_d, mode.eigenvalue
     apart = np.sort(np.abs(spectrum.values - value))[:2]
     k = int(np.argmin(np.abs(spectrum.values - value)))

@@ -24,7 +24,7 @@ AWAY, TRIES = 0.03, 4
 
 
 def singular_configuration(point: OperatingPoint, selection: Selection) -> str:
-    """What is singular about a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is.
+    """Singularity of a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is.
 
     Held coordinates and speeds count as constraints: a crank that is held at its dead point holds a linkage at all positions
     nearby, but not there.
@@ -56,7 +56,7 @@ def singular_configuration(point: OperatingPoint, selection: Selection) -> str:
 
 
 def _rank(point: OperatingPoint, x: np.ndarray, held: tuple[list[int], list[int]]) -> int:
-    """Of the rows of constraints, and of those of held coordinates and speeds, which are given the length 1."""
+    """Rank of the rows of constraints, and of those of held coordinates and speeds, which are given the length 1."""
     coordinates, speeds = held
     rows = np.vstack([point.at(x=x).N[coordinates], np.eye(point.sizes[1])[speeds]]) * natural_scales(point)
     lengths = np.linalg.norm(rows, axis=1, keepdims=True)

@@ -6,8 +6,8 @@ that no such change carries an eigenvalue across, because |(z - A)^-1| E + |(z -
 proves on which side of the boundary of stability (imaginary axis, or unit circle) what is inside stays. The test does not
 depend on units: a
 change of scales by a diagonal D leaves the spectral radius as it is, and damping of a gram counts next to stiffness of a bridge.
-What remains lies on the boundary, but for rounding. Jordan blocks of the eigenvalue zero are counted by a staircase of
-null spaces, whose ranks are judged by the same E.
+The remaining eigenvalues lie on the boundary, but for rounding. Jordan blocks of the eigenvalue zero are counted by a staircase
+of null spaces, whose ranks are judged by the same E.
 Source: Higham, Accuracy and Stability of Numerical Algorithms, chapter 7 (componentwise errors); Hinrichsen and Pritchard,
 Mathematical Systems Theory I, section 5.3 (spectral value sets); Golub and Wilkinson, Ill-conditioned eigensystems and the
 computation of the Jordan canonical form, SIAM Review 18 (1976).
@@ -49,7 +49,7 @@ DISCRETE = Boundary(lambda value: abs(value) - 1.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """What is not known of a matrix A (m, m): changes up to E (m, m) entry by entry; L X with |X| <= F; and L Y S A with |Y| <=
+    """Uncertainty of a matrix A (m, m): changes up to E (m, m) entry by entry; L X with |X| <= F; and L Y S A with |Y| <=
     G, of a mass matrix whose inverse is L and that acts on the rates S A x. L (m, k), F (k, m), G (k, k), S (k, m).
 
     rounding (m, m): entries that are no larger are zeros but for rounding
@@ -69,7 +69,7 @@ class Unknown:
         return cls(E, np.zeros((m, 0)), np.zeros((0, m)), np.zeros((0, 0)), np.zeros((0, m)), E)
 
     def scaled(self, scale: np.ndarray) -> Unknown:
-        """Of D^-1 A D with the diagonal D."""
+        """Uncertainty of D^-1 A D with the diagonal D."""
         into = scale / scale[:, None]
         return Unknown(self.E * into, self.L / scale[:, None], self.F * scale, self.G, self.S * scale, self.rounding * into)
 
@@ -78,7 +78,7 @@ class Unknown:
         return Unknown(self.E + E, self.L, self.F, self.G, self.S, self.rounding + E)
 
     def within(self, columns: np.ndarray) -> Unknown:
-        """Of V^T A V for orthonormal columns V."""
+        """Uncertainty of V^T A V for orthonormal columns V."""
         size = np.abs(columns)
         return Unknown(size.T @ self.E @ size, columns.T @ self.L, self.F @ size, self.G, self.S @ columns,
                        size.T @ self.rounding @ size)
@@ -297,7 +297,7 @@ def _nullity(B: np.ndarray, unknown: Unknown) -> int:
 
 
 def _staircase(B: np.ndarray, unknown: Unknown) -> tuple[int, ...]:
-    """How many Jordan blocks of the eigenvalue zero have at least 1, 2, ... members."""
+    """Number of Jordan blocks of the eigenvalue zero with at least 1, 2, ... members."""
     result: list[int] = []
     while len(B):
         count = _nullity(B, unknown)

@@ -298,7 +298,7 @@ def _as_seen(observer: Observer, values: np.ndarray, shape: Callable[[int], np.n
 
 
 def _partner(values: np.ndarray, k: int) -> int:
-    """The index of the complex conjugate of a value; k of a real one. Of equal ones the one with the same rank among them."""
+    """The index of the complex conjugate of a value; k of a real one. Equal values are paired by their rank among them."""
     value = values[k]
     if abs(value.imag) <= 1e-12 * abs(value) or not value.imag:
         return k

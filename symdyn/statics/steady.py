@@ -1,10 +1,10 @@
 """Whether the linear equations about a state stay the same along its motion: rest, steady motion, or neither.
 
 Eigenvalues decide about stability where the linear equations are constant: at rest, where nothing depends on time, and along a
-motion with constant speeds that leaves them as they are (a top, a wheel that rolls straight). That is checked at positions
-further on: accelerations must stay zero there, and the matrices equal.
-Source: Meirovitch, Methods of Analytical Dynamics, chapter 6 (perturbation about steady motion); Hagedorn and Hochlenert,
-Technische Schwingungslehre, chapter 5 (constant and periodic coefficients).
+motion with constant speeds that leaves them as they are (a top, a wheel that rolls straight). Constancy is checked at positions
+further on: accelerations must stay zero there, and the matrices equal. Source: Meirovitch, Methods of Analytical Dynamics,
+chapter 6 (perturbation about steady motion); Hagedorn and Hochlenert, Technische Schwingungslehre, chapter 5 (constant and
+periodic coefficients).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ PRECISE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Steadiness:
-    """What a state is: "rest", "steady motion", or "" with the reason why it is neither."""
+    """Kind of a state: "rest", "steady motion", or "" with the reason why it is neither."""
 
     kind: str
     reason: str = ""

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 # Times of a period, and of a motion without one, which lasts so many time constants.
 _TIMES, _CONSTANTS = 64, 3.0
-# How far the centre of mass that moves most goes by default, of the mechanism's extent; how far angles change at most.
+# Default way of the centre of mass that moves most, as a part of the mechanism's extent; largest change of angles.
 _SEEN, _TURNED = 0.12, 0.4
 _STEP = 1e-5
-# How far positions on the constraints may be from the shape, of the amplitude.
+# Largest distance of positions on the constraints from the shape, relative to the amplitude.
 _AWAY = 0.5
 
 
@@ -77,7 +77,7 @@ def _held(linear: Linearization, x: np.ndarray, t: float, size: float) -> np.nda
 
 
 def _visible(linear: Linearization, shape: np.ndarray) -> float:
-    """How large the largest change of a coordinate is to be."""
+    """Size of the largest change of a coordinate."""
     module = linear.module
     if "positions" not in module.functions:
         return _TURNED

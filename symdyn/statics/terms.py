@@ -161,7 +161,7 @@ class OperatingPoint:
 
     @property
     def balance_x(self) -> np.ndarray:
-        """Of the statics by x, (n_u + n_c + n_z, n_x)."""
+        """Derivative of the statics by x, (n_u + n_c + n_z, n_x)."""
         return self.whole_x[:self._statics]
 
     @cached_property
@@ -197,7 +197,7 @@ class OperatingPoint:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """What makes constraints lengths, (n_c,)."""
+        """Factors that make constraints lengths, (n_c,)."""
         return self.evaluate("C_scale") if self.sizes[3] else np.zeros(0)
 
     @cached_property

@@ -1,9 +1,9 @@
 """Whether an equilibrium is the only one near its state: whether there is a stiffness in every direction.
 
 The stiffness along a direction is a sum over all loads. Where it is zero within rounding it either vanishes, since no load acts
-along the direction, or it is lost in the digits of larger terms that cancel (1e-6 N/m next to 1e12 N/m). What every single load
-contributes decides between the two: the exact derivative of the stiffness by a parameter, times the parameter, holds none of
-the terms of other loads.
+along the direction, or it is lost in the digits of larger terms that cancel (1e-6 N/m next to 1e12 N/m). The contribution of
+every single load decides between the two: the exact derivative of the stiffness by a parameter, times the parameter, holds none
+of the terms of other loads.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _lost(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray, leader: int, error: float, terms: float) -> str:
-    """What loads contribute to a stiffness u^T K v that is zero within `error`, in words; "" where they contribute nothing.
+    """Contributions of loads to a stiffness u^T K v that is zero within `error`, in words; "" where they contribute nothing.
 
     u, v    (n_u,) left and right direction; leader: the coordinate by whose displacement sizes are given
     terms   size of the terms of the stiffness
@@ -122,7 +122,7 @@ def _lost_in_trim(search: Search, direction: np.ndarray) -> str:
 
 
 def _contribution(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray, k: int) -> float:
-    """What the load of parameter (or input) k contributes to u^T K v, with its part in the multipliers; 0 within rounding."""
+    """Contribution of the load of parameter (or input) k to u^T K v, with its part in the multipliers; 0 within rounding."""
     metadata = point.module.metadata
     name = (*metadata.parameters, *metadata.inputs)[k]
     value = float(np.concatenate([point.p, point.inputs])[k])

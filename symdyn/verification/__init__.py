@@ -1,7 +1,7 @@
 """Proves equations of motion sound without a reference: identities that must hold at any state, at 30 digits.
 
-Identities that exact algebra proves with products of few terms are proved, for every state, and are not evaluated. Which these
-are depends on the equations alone, not on time or the machine. The others are checked at random states:
+Identities that exact algebra proves with products of few terms are proved, for every state, and are not evaluated. These depend
+on the equations alone, not on time or the machine. The others are checked at random states:
 
 A check is a function of a Sample that returns its residual, or None where it does not apply; a new formulation joins by
 naming its quantities alike, a new check by one line in CHECKS, or in CONSTRAINED.
@@ -34,7 +34,7 @@ from symdyn.verification.user_functions import checks_of_user_functions, without
 # Digits that are added where a residual is above its tolerance, and seeds of the changes of constants within their rounding.
 MORE_DIGITS = 25
 ROUNDINGS = (1, 2, 3)
-# What is allowed, by the largest residual that rounding makes over these seeds. A residual r of another cause adds no more than
+# Tolerance, by the largest residual that rounding makes over these seeds. A residual r of another cause adds no more than
 # r MARGIN / ENLARGED to it, so that it is found.
 MARGIN = 20.0
 
@@ -174,7 +174,7 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
 
 
 def _proved(equations: Equations) -> set[Callable[[Sample], float | None]]:
-    """Checks that exact algebra proves. That of the kinetic energy needs a mass matrix without speeds besides its claim."""
+    """Checks that exact algebra proves. The check of the kinetic energy needs a mass matrix without speeds besides its claim."""
     claims = proved_quickly(equations, {name for names in PROVED_BY.values() for name in names})
     result = {check for check, names in PROVED_BY.items() if claims.issuperset(names)}
     if holds.kinetic_energy_quadratic in result and depends_on(equations.quantity("M_tilde").ravel(), SPEED):

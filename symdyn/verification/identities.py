@@ -146,7 +146,7 @@ def angular_velocities(s: Sample, changes: Mapping[str, Any]) -> np.ndarray:
 
 
 def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
-    """What a compiled module gives against the tape at high precision, over the condition of M_tilde or the whole system."""
+    """Error of a compiled module against the tape at high precision, over the condition of M_tilde or the whole system."""
     def check(s: Sample) -> float | None:
         eq = s.equations
         module = eq.compile(backend=backend)

@@ -109,12 +109,13 @@ def _rigid(model: Any) -> list[int]:
 
 
 def _owner(equations: Equations) -> Any:
-    """What records the reactions; None of equations without bodies."""
+    """Object that records the reactions; None of equations without bodies."""
     return getattr(equations.quantities.get("reactions"), "__self__", None)
 
 
 def _joints(s: Sample, owner: Any, bodies: Mapping[str, np.ndarray]) -> list[tuple[Any, int, int, np.ndarray, np.ndarray]]:
-    """Of every joint: itself, places of parent and child (-1: ground), its point on the child, n-frame, and its reaction."""
+    """Data of every joint: itself, indices of parent and child (-1: ground), its point on the child, n-frame, and its
+    reaction."""
     known = {joint[0]: wrench for joint, wrench in zip(s.equations.joints, s["reactions"], strict=True)}
     return [(joint, parent, child, bodies["points"][k], known.get(joint.name, bodies["wrenches"][k]))
             for k, (joint, parent, child) in enumerate(_all_joints(owner))]

@@ -21,7 +21,7 @@ from symdyn.tape.intrinsics import RANK
 from symdyn.tape.tape import Tape
 from symdyn.verification.sample import Sample
 
-# How far from the initial state coordinates are drawn; farther where no consistent state is near.
+# Distances from the initial state at which coordinates are drawn; farther where no consistent state is near.
 SPREADS = (0.3, 1.0, 2.0)
 # Newton steps that take 12 digits to all.
 STEPS = 5

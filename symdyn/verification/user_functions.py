@@ -41,7 +41,7 @@ def checks_of_user_functions(equations: Equations, backends: Mapping[str, str]) 
 
 
 def without_digits(equations: Equations) -> str:
-    """What to say of functions that are known in floating point only."""
+    """Message about functions that are known in floating point only."""
     names = [f.label for f in user_functions(equations) if f.digits is None]
     several = len(names) > 1
     return "" if not names else (f"{', '.join(names)}: in floating point, as {'they have' if several else 'it has'} no function "
