@@ -1,4 +1,4 @@
-"""How one quantity varies over an ensemble: listed, spaced evenly, or distributed; read from plain values."""
+"""Variation of one quantity over an ensemble: listed, spaced evenly, or distributed; read from plain values."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def listed(values: np.ndarray, record: Any) -> Axis:
     return Axis(values, lambda p: values[np.minimum((p * len(values)).astype(int), len(values) - 1)], record)
 
 
-# What a distribution takes, and which values it has at probabilities.
+# Arguments of a distribution, and their conditions.
 DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str]] = {
     "uniform": (("from", "to"), "from < to"),
     "loguniform": (("from", "to"), "0 < from < to"),

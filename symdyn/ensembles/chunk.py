@@ -44,7 +44,7 @@ class MemberFailed(SymdynError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What all members have in common.
+    """Data that all members have in common.
 
     system       a portable module
     base         q, u, z, parameters and inputs as they are where samples do not change them
@@ -185,7 +185,7 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
 
 
 def _advice(setting: Setting) -> str:
-    """What to do about starts that are not consistent."""
+    """Advice about starts that are not consistent."""
     return "begin each motion with the nearest consistent state: consistent=True, in a sweep file consistent = true" + (
         "" if setting.device == "cpu" else ", and leave device out")
 
@@ -198,7 +198,7 @@ def as_measured(setting: Setting, solution: Solution) -> Solution:
 
 
 def _states_only(setting: Setting, x: np.ndarray, steps: tuple[int, int], params: np.ndarray, inputs: np.ndarray) -> StatesOnly:
-    """What outcomes get of a motion that was integrated together with others."""
+    """Solution that outcomes get of a motion that was integrated together with others."""
     module: Module = setting.system.module
     rtol, atol = checked_tolerances(module, setting.options.get("rtol", RTOL), setting.options.get("atol"))
     return StatesOnly(module, setting.times, x, steps, params, inputs, setting.options.get("method", METHOD),
@@ -206,19 +206,19 @@ def _states_only(setting: Setting, x: np.ndarray, steps: tuple[int, int], params
 
 
 def _raise_others(error: Exception) -> None:
-    """What this process lacks is no fault of a member: another one may have it."""
+    """A facility that this process lacks is no fault of a member: another one may have it."""
     if isinstance(error, (NotSent, CompileError, CompilerNotFound, MissingExtra, OfDevice, MemoryError)):
         raise error
 
 
 def numbers_of(setting: Setting) -> int:
-    """How many numbers a motion has."""
+    """Number of values of a motion."""
     n_columns = len(setting.options.get("sensitivities", ()))
     return len(setting.times) * max(1, len(setting.system.module.metadata.x)) * (1 + 2 * n_columns)
 
 
 def held_at_once(setting: Setting) -> int:
-    """How many motions are held at a time where several are integrated at once."""
+    """Number of motions held at a time where several are integrated at once."""
     return max(1, (NUMBERS if setting.device == "cpu" else NUMBERS_OF_DEVICE) // numbers_of(setting))
 
 
@@ -304,7 +304,7 @@ def setting_of(system: Any, names: Sequence[str], times: np.ndarray, measures: S
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """What simulations warn of stands in the failures."""
+    """Warnings of simulations stand in the failures."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)
         yield

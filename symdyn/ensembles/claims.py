@@ -1,4 +1,4 @@
-"""Which worker computes which piece, where workers have nothing in common but a folder, come at any time and may be killed.
+"""Assignment of pieces to workers, where workers have nothing in common but a folder, come at any time and may be killed.
 
     claims/PIECE.G    claim number G of a piece; the worker that made the file has the piece as long as it touches the file
 
@@ -109,7 +109,7 @@ class Claims:
                 path.unlink(missing_ok=True)
 
     def at_work(self) -> int:
-        """How many pieces other workers have claimed."""
+        """Number of pieces that other workers have claimed."""
         now = self._now()
         return sum(not self._ended(path, now) for piece, (_, path) in self._latest().items() if piece not in self._own)
 

@@ -1,4 +1,4 @@
-"""What a function of the user computes, as far as it can be found out: a short text that changes with its code."""
+"""Fingerprint of a function of the user, as far as it can be found out: a short text that changes with its code."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ DEPTH = 8
 
 
 def fingerprint(function: Callable[..., Any]) -> str:
-    """Of the statements, constants, defaults and enclosed values of a function, and of the functions and plain values of its
-    module that it names. Comments and line numbers do not count; installed packages, and what objects hold, are not looked at.
+    """Fingerprint of the statements, constants, defaults and enclosed values of a function, and of the functions and plain values
+    of its module that it names. Comments and line numbers do not count; installed packages, and what objects hold, are not looked
+    at.
     """
     digest = hashlib.sha256(f"{sys.version_info[0]}.{sys.version_info[1]}".encode())  # other versions have other byte code
     for part in _parts(function, DEPTH, set()):

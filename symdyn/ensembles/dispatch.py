@@ -10,7 +10,7 @@ from typing import Any
 from symdyn.ensembles.chunk import Chunk, Done, run_chunk
 from symdyn.errors import SymdynError
 
-# How often a chunk is tried before the run stops.
+# Number of attempts at a chunk before the run stops.
 ATTEMPTS = 3
 # Chunks that wait for every worker, so that none is ever idle.
 AHEAD = 3
@@ -69,19 +69,19 @@ def run_chunks(todo: Iterator[Chunk], make: Callable[[], Executor], again: bool,
 
 
 def _done(pending: Mapping[Future[Done], Any]) -> Iterator[Done]:
-    """What is there already when the run stops."""
+    """Results that are there already when the run stops."""
     for future in pending:
         if future.done() and not future.cancelled() and future.exception() is None:
             yield future.result()
 
 
 def _is_shut(error: Exception) -> bool:
-    """What `submit` of an executor that was shut down raises has no class of its own."""
+    """The error that `submit` of an executor raises after its shutdown has no class of its own."""
     return isinstance(error, RuntimeError) and ("shutdown" in str(error) or "closed" in str(error).lower())
 
 
 def _workers(executor: Any) -> int:
-    """How many tasks an executor does at a time, as far as it reports this."""
+    """Number of tasks that an executor does at a time, as far as it reports this."""
     workers = getattr(executor, "_max_workers", None)
     if isinstance(workers, int):
         return max(1, workers)

@@ -1,4 +1,4 @@
-"""What is kept of a motion: a few numbers of a coordinate, speed, input, output or the energy, or what a function returns."""
+"""Values kept of a motion: a few numbers of a coordinate, speed, input, output or the energy, or what a function returns."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Measure:
     grad: bool = False
 
     def of(self, solution: Solution) -> np.ndarray:
-        """Its value. Whatever a function of the user raises passes through."""
+        """Its value. Errors of a function of the user pass through."""
         if self.function is not None:
             return real_of(self.function(solution), solution.module.name,
                            f"values of the outcome {shown(self.label)} must be numbers")
@@ -95,7 +95,7 @@ class Measure:
         return np.asarray(REDUCTIONS[self.kind](t, values))
 
     def record(self) -> str:
-        """What distinguishes it from others."""
+        """Record that distinguishes it from others."""
         function = self.function
         return f"{'grad ' * self.grad}{self.kind} {self.name}" if function is None else (
             f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}")

@@ -18,7 +18,8 @@ try:
 except ImportError as error:
     raise MissingExtra(f"pictures need matplotlib: pip install 'symdyn[plot]' ({error})") from None
 
-# Of more members every so-many-th is drawn, so that a picture takes the same time and memory for any number.
+# Largest numbers of members that are drawn, equally spaced among more, so that a picture takes the same time and memory for any
+# number.
 DRAWN_TRACES, DRAWN_POINTS = 20_000, 5_000
 BANDS = ((0.05, 0.95), (0.25, 0.75))
 COLUMNS, ROWS = 3, 3
@@ -89,7 +90,7 @@ def _points(axes: Any, ensemble: Ensemble, x: str, y: str) -> None:
 
 
 def _with_unit(ensemble: Ensemble, label: str) -> str:
-    """Of outcomes the unit of what they are about."""
+    """Label with its unit; an outcome has the unit of its quantity."""
     for name in (label, label.partition(" ")[2], label.partition(" at ")[0]):
         if ensemble.units.get(name):
             return f"{label} [{ensemble.units[name]}]"

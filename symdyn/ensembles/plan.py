@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 # Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
 CHUNK, CHUNK_OF_DEVICE, PARTS = 1000, 100_000, 16
-# Of very many samples chunks are larger, so that a folder has no more files than this; but no larger than these bytes.
+# Chunks of very many samples are larger, so that a folder has no more files than this; but no larger than these bytes.
 MOST_CHUNKS, CHUNK_BYTES = 10_000, 2**26
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
 TRIED = 8
-# Of results by a GPU, whatever its number on a machine: several of them may share a folder.
+# Name in results by a GPU, whatever its number on a machine: several of them may share a folder.
 GPU = "gpu"
 # From so many samples on it is worth compiling code that integrates several motions at once.
 VECTORS_FROM = 2000
@@ -45,7 +45,7 @@ VECTORS_FROM = 2000
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be computed.
+    """Plan of a computation.
 
     size   samples in a chunk, as it was asked for; None: by their number
     """
@@ -56,7 +56,7 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """Of the mechanism."""
+        """Name of the mechanism."""
         return str(self.setting.system.module.name)
 
     @property
@@ -108,7 +108,7 @@ class Plan:
                 "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}
 
     def about(self) -> dict[str, Any]:
-        """What readers of the results need."""
+        """Data that readers of the results need."""
         module, measures = self.setting.system.module, self.setting.measures
         return {"system": module.name, "names": list(self.samples.names), "varied": list(self.samples.varied),
                 "outcomes": [m.label for m in measures], "count": self.samples.count,

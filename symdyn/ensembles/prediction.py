@@ -46,7 +46,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Measured:
-    """What ten samples have shown.
+    """Measurements of ten samples.
 
     alone       seconds of each motion by itself, on a core
     motion      seconds of one core, or of a GPU, for a motion as the run computes it; NaN: on a GPU that this machine lacks
@@ -73,13 +73,13 @@ class Measured:
         return not math.isnan(self.motion)
 
     def speedup(self, cores: int) -> float:
-        """How many times the rate of one core so many cores of a worker have, by Amdahl's law."""
+        """Rate of so many cores of a worker relative to one core, by Amdahl's law."""
         return 1 / (self.serial + (1 - self.serial) / cores)
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What stands in the way of more motions: what it is, the number of motions from which on, and what to do."""
+    """Limit to more motions: what it is, the number of motions from which on, and what to do."""
 
     what: str
     motions: float
@@ -88,7 +88,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a number of motions takes.
+    """Cost of a number of motions.
 
     motion, spread     seconds of a core for a motion, and their standard deviation from motion to motion
     error              relative error of the sum over all motions, from the spread of ten
@@ -144,7 +144,7 @@ def measure(plan: Plan, folder: Path, cores: int, formats: tuple[str, ...], star
 
 
 def predict(plan: Plan, measured: Measured, count: int, workers: int, cores: int) -> Prediction:
-    """What so many motions take; arithmetic alone, whatever their number."""
+    """Cost of so many motions; arithmetic alone, whatever their number."""
     size = plan.chunk_size(count)
     n_chunks = -(-count // size)
     chunk_bytes = size * (8 * plan.outcome_numbers)
@@ -196,7 +196,7 @@ def contradictions(result: Prediction, measured: Measured, cluster: Cluster, ask
 
 
 def limits(plan: Plan, measured: Measured, cluster: Cluster, folder: Path, workers: int, cores: int) -> list[Limit]:
-    """What stands in the way of more motions, that which comes first first."""
+    """Limits to more motions, the lowest first."""
     def of(n: int) -> Prediction:
         return predict(plan, measured, n, workers, cores)
 

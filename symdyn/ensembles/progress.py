@@ -1,4 +1,4 @@
-"""What the workers of a run have done so far: each writes a small file, and anybody may read them all."""
+"""Progress of the workers of a run: each writes a small file, and anybody may read them all."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Worker:
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is: samples that are kept, of how many; members that failed, as far as workers have reported; workers."""
+    """Progress of a run: samples that are kept, of how many; members that failed, as far as workers have reported; workers."""
 
     system: str
     count: int
@@ -91,7 +91,7 @@ class Status:
 
 
 def read_status(folder: Path, lease: float = LEASE) -> Status:
-    """How far the run in a folder is. Raises ArgumentError where there is none."""
+    """Progress of the run in a folder. Raises ArgumentError where there is none."""
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except FileNotFoundError:

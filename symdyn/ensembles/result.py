@@ -1,4 +1,4 @@
-"""What an ensemble has computed."""
+"""Results of an ensemble."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Ensemble:
 
     @property
     def failed(self) -> np.ndarray:
-        """Which members failed, (count,) of bool.
+        """Mask of the members that failed, (count,) of bool.
 
         >>> import tempfile
         >>> module = sd.systems.pendulum().compile(backend="numpy")

@@ -195,7 +195,7 @@ def _in_folder(asked: Plan, folder: Path, how: How, resume: bool, lasting: bool)
 
 
 def _of_disk(error: OSError) -> str:
-    """What the disk rejects, in words."""
+    """Error of the disk, in words."""
     why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "results cannot be written"
     return f"{why} ({error})"
 
@@ -282,7 +282,7 @@ class _Run:
             clock.sleep(LOOK)
 
     def _look(self) -> set[int]:
-        """Which chunks are there, of all workers; the bar shows it."""
+        """Chunks that are there, of all workers; the bar shows it."""
         there = self.store.there()
         if self.bar is not None:
             self.bar.update(self._count(there) - self.bar.n)
@@ -368,7 +368,7 @@ class _Run:
         return f"computed samples {first} to {first + self.store.samples_in(int(piece)) - 1}"
 
     def _doubts(self) -> str:
-        """What to warn of where derivatives of members are doubtful."""
+        """Warning where derivatives of members are doubtful."""
         if not self.doubts:
             return ""
         more = f"; and {self.n_doubtful - LISTED} more" if self.n_doubtful > LISTED else ""
@@ -383,7 +383,7 @@ class _Run:
                 "pass resume=True (--resume) to go on from there")
 
     def _executors(self) -> tuple[Callable[[], Executor], bool, list[Executor]]:
-        """What gives executors, whether it gives another one, and those that are ours to end."""
+        """Function that gives executors, whether it gives another one, and the executors that this run ends."""
         own: list[Executor] = []
         given = self.how.executor
         if given is not None and hasattr(given, "submit"):

@@ -79,7 +79,7 @@ def submit(folder: Path, text: str) -> str:
 
 
 def queue(folder: Path) -> str:
-    """What the queue has of the jobs of a folder, in words; nothing where no job was submitted, or there is no queue."""
+    """State of the jobs of a folder in the queue, in words; nothing where no job was submitted, or there is no queue."""
     with contextlib.suppress(OSError, ValueError, subprocess.SubprocessError):
         jobs = json.loads((folder / JOB).read_text(encoding="utf-8"))["jobs"]
         run = subprocess.run(["squeue", "--noheader", "--array", "--format=%T", f"--jobs={','.join(jobs)}"], capture_output=True,

@@ -52,7 +52,7 @@ class Store:
         return {k for k in self.there() if self._is_whole(k)}
 
     def there(self) -> set[int]:
-        """Which chunks have files, by their names alone."""
+        """Chunks with files, by their names alone."""
         result: set[int] = set()
         with contextlib.suppress(FileNotFoundError):
             result = {int(stem) for entry in os.scandir(self.chunks)

@@ -63,7 +63,7 @@ CHOICES = {"formulation": ("auto", "embedding", "recursive", "augmented"), "coor
 
 @dataclass
 class Sweep:
-    """What a file asks for.
+    """Sweep that a file requests.
 
     values   the texts, numbers and tables that stood there and are right
     folder   where results go: the file's `output`, inside the folder of the file; None without one
@@ -78,7 +78,7 @@ class Sweep:
     varied: dict[str, list[str]] = field(default_factory=dict)
 
     def arguments(self, module: Any) -> dict[str, Any]:
-        """What `ensemble` takes. The names have been checked."""
+        """Arguments of `ensemble`. The names have been checked."""
         metadata, start = module.metadata, self.fixed.get("initial", {})
         states = {group: {n: v for n, v in start.items() if n in metadata.names(group)} or None for group in ("q", "u", "z")}
         return {"samples": self.samples, "t": self.values.get("t"), "outcomes": self.values.get("outcomes"), **states,

@@ -134,13 +134,13 @@ def flips(short: bool) -> Iterator[Row]:
 
 
 def _period(I: tuple[float, ...], a: Any, c: Any) -> Any:
-    """Of one angular velocity's oscillation, s."""
+    """Period of one angular velocity's oscillation, s."""
     rate, m = _rate(I, a, c)
     return 4 * mpmath.ellipk(m) / rate
 
 
 def _rate(I: tuple[float, ...], a: Any, c: Any) -> tuple[Any, Any]:
-    """Of the elliptic argument, 1/s, and the parameter m = k^2; see Landau and Lifshitz, Mechanics, section 37."""
+    """Rate of the elliptic argument, 1/s, and the parameter m = k^2; see Landau and Lifshitz, Mechanics, section 37."""
     I1, I2, I3 = map(mpmath.mpf, I)
     a, c = mpmath.mpf(a), mpmath.mpf(c)
     twice_E, M2 = I1 * a**2 + I3 * c**2, (I1 * a) ** 2 + (I3 * c) ** 2

@@ -1,4 +1,4 @@
-"""What generated code must give but for rounding: its own statements with 32 digits, and bounds of rounding errors."""
+"""Expected results of generated code but for rounding: its own statements with 32 digits, and bounds of rounding errors."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from symdyn.stress.system_under_test import EPS, SystemUnderTest
 SAFETY = 2.0
 # Below this numbers lose digits by themselves.
 SMALLEST = 1e-290
-# What is left of a row of the constraints without the others, of 32 digits, if it depends on them.
+# Rest of a row of the constraints without the others, of 32 digits, if it depends on them.
 NOTHING = 1e-20
-# Of the equations of motion.
+# Terms of the equations of motion.
 TERMS = ("mass_matrix", "k_tilde", "F_tilde", "C_r")
 
 
@@ -59,7 +59,7 @@ class Coded:
             bounds[where] = SAFETY * result.of(backend)
 
     def bound(self, backend: str) -> np.ndarray:
-        """Of rounding errors (n, size), infinite where none is known."""
+        """Bound of rounding errors (n, size), infinite where none is known."""
         result = self._bounds[backend]
         # Products of two errors, where a result is a product of two numbers that vanish but for rounding.
         result = result + EPS * largest(result, self.labels, self.factors)
@@ -88,7 +88,7 @@ def imbalance(tested: SystemUnderTest, rows: np.ndarray, u_dot: np.ndarray, back
     off = {}
     for name, tape in tapes.items():
         result = SAFETY * first_order(tape, leaves(tested, rows), len(rows)).of(backend)
-        # Of an algorithm with branches so many roundings of what is largest.
+        # An algorithm with branches counts so many roundings of the largest value.
         sizes = np.abs(halves(true[name], result.shape[1])[0]).max(axis=1, initial=0.0, keepdims=True)
         off[name] = np.where(np.isfinite(result), result, EPS * tape.longest_chain() * sizes)
     missed = np.full(len(u_dot), -16.0)

@@ -64,7 +64,7 @@ def steps(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
 
 
 def _phases(sol: Any) -> int:
-    """How often a motion begins: once, and after every switch of rigid contacts."""
+    """Number of times that a motion begins: once, and after every switch of rigid contacts."""
     times = [t for one in sol.contacts.values() for t in (*(when for when, _ in one.switches), *one.impacts.t.tolist())]
     return max(1, len({float(t) for t in times} | {float(sol.t[0])})) if sol.module.metadata.contacts else 1
 

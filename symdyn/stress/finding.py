@@ -1,4 +1,4 @@
-"""What comes of comparing generated code with 32 digits, and the rows that tell it."""
+"""Results of comparing generated code with 32 digits, and the rows that report them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ BOUND = ("decimal digits beyond twice the first-order bound of rounding errors: 
 
 @dataclass(frozen=True)
 class Aside:
-    """Of states that are set aside, next to lost rank or singular to the last digit: how many have lost more digits than the
-    condition explains, the most, and the least condition of these; of all of them the digits beyond the first-order bound, at
-    how many a divisor is but rounding error, and, at others without a bound, the digits by which accelerations miss their
-    equations beyond what is due."""
+    """States that are set aside, next to lost rank or singular to the last digit: how many have lost more digits than the
+    condition explains, the most, and the least condition of these; of all of them the digits beyond the first-order bound, at how
+    many a divisor is but rounding error, and, at others without a bound, the digits by which accelerations miss their equations
+    beyond what is due."""
 
     states: int = 0
     most: float = -np.inf
@@ -31,7 +31,7 @@ class Aside:
 
 @dataclass(frozen=True)
 class Finding:
-    """What came of a function's values: the most decimal digits lost beyond what is due (plain: with a system that is solved in
+    """Finding about a function's values: the most decimal digits lost beyond what is due (plain: with a system that is solved in
     plain numbers), how many states were rejected and the least condition there; the states next to lost rank and the singular
     ones; of the others the digits beyond the first-order bound of rounding errors, and at how many of them none is known."""
 

@@ -2,9 +2,9 @@
 result.
 
 A result y of operations v_i = f_i(...), each computed as v_i (1 + d_i) with |d_i| <= k_i eps, is off by sum_i (dy/dv_i) v_i d_i
-but for products of d's; at most by eps sum_i k_i |dy/dv_i| |v_i|. That grows towards singular positions as rounding errors do.
-Source: Linnainmaa, Taylor expansion of the accumulated rounding error, BIT 16 (1976); Higham, Accuracy and Stability of Numerical
-Algorithms, 2nd ed., section 3.3 and chapter 26.
+but for products of d's; at most by eps sum_i k_i |dy/dv_i| |v_i|. The bound grows towards singular positions as rounding errors
+do. Source: Linnainmaa, Taylor expansion of the accumulated rounding error, BIT 16 (1976); Higham, Accuracy and Stability of
+Numerical Algorithms, 2nd ed., section 3.3 and chapter 26.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from symdyn.tape.walk import walk
 # Half units in the last place that sines and cosines, and other functions, are off by: of C's library and symdyn's own (the GNU C
 # library's manual, "Known Maximum Errors in Math Functions"; templates/c/runtime/sincos.h), and of NumPy's vector instructions.
 LIBRARY = {"c": (2.0, 4.0), "numpy": (8.0, 8.0)}
-# Of what underflows a number of this size is lost.
+# Underflow loses a number of this size.
 TINY = 2.0**-1074
 # Relative changes of divisors by rounding from which on products of changes count.
 HIGHER_ORDER = 0.1
@@ -58,7 +58,7 @@ class FirstOrder:
 
 
 def first_order(tape: Tape, values: Mapping[str, Any], n: int) -> FirstOrder:
-    """Of all entries of a tape's outputs at n states; infinite for those that need an algorithm that is not written out.
+    """Bounds of all entries of a tape's outputs at n states; infinite for those that need an algorithm that is not written out.
 
     values   leaf name -> a number, or an array (n,)
     """

@@ -1,4 +1,4 @@
-"""How a motion magnifies errors: the solution of the variational equations, by the exact Jacobian.
+"""Magnification of errors by a motion: the solution of the variational equations, by the exact Jacobian.
 
 Everything here is scaled: entries of states are divided by the largest value of their unit in the motion.
 """

@@ -19,7 +19,7 @@ from symdyn.stress.record import DEGRADE, FAIL, Row, within
 from symdyn.stress.system_under_test import EPS, SystemUnderTest
 
 DECADES = tuple(10.0**k for k in range(0, 13, 2))
-# How many times as many steps a stiff method may take for stiffness that is 1e12 times as large: what is stiff dies away within
+# Factor of steps that a stiff method may take for stiffness that is 1e12 times as large: stiff parts die away within
 # a time that is 1e6 times as short, and each decade of time from there on may cost once the steps of the soft problem.
 MORE = 7.0
 

@@ -14,7 +14,7 @@ from symdyn.stress.system_under_test import EPS, RTOL, SystemUnderTest
 
 # Magnifications up to here leave the digits to see an error by.
 MAGNIFIED = 1e3
-# Of constraints, by projection; relative to the mechanism's length, see symdyn.runtime.integrating.stabilization.
+# Residual of constraints under projection, relative to the mechanism's length, see symdyn.runtime.integrating.stabilization.
 KEPT = 1e-12
 # A change that is followed: far above rounding errors and tolerances, far below where it is no longer small.
 CHANGE = 1e-6
@@ -196,7 +196,7 @@ def _onto(tested: SystemUnderTest, x: np.ndarray) -> np.ndarray:
 
 
 def _tangent(tested: SystemUnderTest, t: float, x: np.ndarray, scales: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """What projection leaves of a change (scaled)."""
+    """Projection of a change (scaled)."""
     size = float(np.linalg.norm(change))
     if size == 0:
         return change

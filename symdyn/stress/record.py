@@ -21,7 +21,7 @@ LEGEND = {
     FAIL: "anything else",
 }
 _WIDTH = 118
-# Of a mechanism that begins in equilibrium, or has no forces and no speeds.
+# Remark on a mechanism that begins in equilibrium, or has no forces and no speeds.
 STILL = "the motion stands still"
 
 
@@ -101,7 +101,7 @@ class StressReport:
         return bool(self.rows) and all(row.verdict != FAIL for row in self.rows)
 
     def count(self) -> dict[str, int]:
-        """How many rows of each verdict."""
+        """Number of rows of each verdict."""
         result = Counter(row.verdict for row in self.rows)
         return {verdict: result[verdict] for verdict in (PASS, DEGRADE, FAIL)}
 

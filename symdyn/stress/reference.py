@@ -1,4 +1,4 @@
-"""What rounding errors are measured by: values at 32 digits, condition numbers, the sizes of what is added up."""
+"""References for rounding errors: values at 32 digits, condition numbers, the sizes of what is added up."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DIGITS = 32
 DEPENDENT = 1e-12
 CORRECTIONS = ("position_correction", "velocity_correction")
 FORCES = ("k_tilde", "F_tilde", "inverse_dynamics")
-# What may depend on accelerations and multipliers; whether it does is seen on its tape.
+# Functions that may depend on accelerations and multipliers; whether it does is seen on its tape.
 MAY_DEPEND = ("outputs", "reactions", "cut_loads", "power")
 
 
@@ -145,7 +145,7 @@ def conditions(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np
 
 
 def _singular_values(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np.ndarray | None) -> np.ndarray:
-    """Of the constraints' Jacobian with rows as lengths, over the usual largest, (n, m)."""
+    """Singular values of the constraints' Jacobian with rows as lengths, over the usual largest, (n, m)."""
     n = len(tested.symbols.speeds)
     J = tested.evaluate("C_r", t, x, params).reshape(len(x), -1, n)
     J = J * tested.evaluate("C_scale", t, x, params)[:, :, None]
@@ -181,7 +181,7 @@ def _by_diagonal(matrix: np.ndarray) -> np.ndarray:
 
 
 def _condition(matrix: np.ndarray, without: int = 0) -> float:
-    """Of a matrix without its smallest so many singular values."""
+    """Condition of a matrix without so many of its smallest singular values."""
     if not np.isfinite(matrix).all():
         return float("nan")
     if not len(matrix):
@@ -195,8 +195,8 @@ def _condition(matrix: np.ndarray, without: int = 0) -> float:
 
 
 def together(tested: SystemUnderTest, name: str, size: int) -> np.ndarray:
-    """Which entries of a function are computed and compared together, (size,) of numbers from 0: those of one unit, one output,
-    origins and rotations apart; the whole function where its entries have no units of their own."""
+    """Groups of entries of a function that are computed and compared together, (size,) of numbers from 0: those of one unit, one
+    output, origins and rotations apart; the whole function where its entries have no units of their own."""
     metadata = tested.module.metadata
     units = [metadata.units.get(x, x) for x in metadata.x]
     n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
@@ -248,7 +248,7 @@ def largest(values: np.ndarray, labels: np.ndarray, factors: np.ndarray) -> np.n
 
 def terms(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray,
           params: np.ndarray | None = None) -> np.ndarray:
-    """How large the terms are that make up entries whose sum may vanish for every parameter, (n, 1) or (n, size): rounding
+    """Sizes of the terms of entries whose sum may vanish for every parameter, (n, 1) or (n, size): rounding
     errors are in proportion to them. Zero for the others."""
     def values(of: str) -> np.ndarray:
         return np.nan_to_num(np.abs(tested.evaluate(of, t, x, params, inputs)), nan=0.0, posinf=0.0)

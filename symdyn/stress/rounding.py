@@ -43,7 +43,7 @@ NEARBY, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
 STATES, WORK, FEW = 1000, 1.5e6, 24
 # Relative changes that conditions are estimated by, and how many.
 CHANGE, TRIALS = 2.0**-30, 8
-# Of positions of lost rank so many are looked at more closely, this far from them.
+# Number of singular configurations that are examined more closely, and distances from them.
 LANDMARKS, DISTANCES = 3, (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 
 
@@ -127,7 +127,7 @@ def towards_lost_rank(tested: SystemUnderTest, where: States) -> States:
 
 
 def _reach(symbols: Symbols) -> np.ndarray:
-    """How large coordinates, speeds and states usually are, (n_x,)."""
+    """Usual sizes of coordinates, speeds and states, (n_x,)."""
     return np.array([float(symbols.reach.get(s, 1)) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)])
 
 
@@ -181,8 +181,8 @@ def rounding(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
 
 
 def _resolved(tested: SystemUnderTest, x: np.ndarray) -> np.ndarray:
-    """What entries of states are known relative to, (n, n_x): themselves, but angles the largest of them, because they are
-    added along a mechanism."""
+    """Sizes that the accuracy of entries of states is relative to, (n, n_x): themselves, but angles the largest of them, because
+    they are added along a mechanism."""
     angles, sizes = _angles(tested), x.copy()
     if angles:
         sizes[:, angles] = np.abs(x[:, angles]).max(axis=1, keepdims=True)
@@ -305,7 +305,7 @@ def compilers() -> list[Compiler]:
 
 
 def _builds(tested: SystemUnderTest, names: list[str], short: bool) -> Iterator[tuple[str, Any]]:
-    """What the functions are run by: name and unit, or what the compiler said."""
+    """Programs that run the functions: name and unit, or what the compiler said."""
     for compiler in compilers():
         levels = ("-O0",) if short else ("-O0", "-O2", "-O3")
         if compiler.kind not in ("gcc", "clang", "zig"):

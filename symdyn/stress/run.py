@@ -122,7 +122,7 @@ Result = tuple[list[Row], list[str], int]
 
 
 def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
-    """What to run: a system ("" for none) with names of checks."""
+    """Tasks to run: a system ("" for none) with names of checks."""
     own = tuple(c.name for c in chosen if not c.of_system)
     of_system = tuple(c.name for c in chosen if c.of_system)
     if system is not None:
@@ -164,8 +164,8 @@ def _chosen(names: str | Sequence[str] | None) -> list[Check]:
 
 
 def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
-    """One check after the other, of a mechanism after its start. What is wrong with its usual motion is reported by the first one
-    that looks at it."""
+    """One check after the other, of a mechanism after its start. Faults of its usual motion are reported by the first check that
+    looks at it."""
     for system, names, short in tasks:
         tested = None
         if system != "":
@@ -183,7 +183,7 @@ def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
 
 
 def _one(tested: SystemUnderTest | None, name: str, short: bool) -> tuple[list[Row], list[str]]:
-    """Rows of a check, and what it leaves out. Whatever a check raises is a row."""
+    """Rows of a check, and what it leaves out. An error that a check raises is a row."""
     check, rows, label = CHECKS[name], [], "-" if tested is None else tested.name
     try:
         for row in check.run(short) if tested is None else check.run(tested, short):

@@ -234,7 +234,7 @@ def user_forces(short: bool) -> Iterator[Row]:
         text = ("static int gust(const double *in, double *out) { const double zero = in[0] - in[0]; "
                 f"out[0] = in[0] > 0.5 ? {value} : 1.0; return 0; }}")
 
-        # What the generated module holds is this function's text, so that it may use its argument and np only.
+        # The generated module holds this function's text, so that it may use its argument and np only.
         if bad == "nan":
             def python(v):  # type: ignore[no-untyped-def]
                 return np.where(v > 0.5, np.nan, 1.0)

@@ -1,6 +1,6 @@
 """The start of a mechanism's motion, looked at before any check: whether there is one, and how far it is from what was given.
 
-What cannot be compiled or evaluated there would be every check's failure, and is the description's.
+A fault of compilation or evaluation there would be every check's failure, and is the description's.
 """
 
 from __future__ import annotations

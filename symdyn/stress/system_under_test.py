@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
 
 EPS = 2.0**-53
-# Of runs that are compared: all but the last digits.
+# Relative tolerance of runs that are compared: all but the last digits.
 RTOL = 1e-10
 # Where a system of the catalogue begins that has no motion of its own: it is in equilibrium.
 NEARBY = {"floating_crane": {"beta": 0.2}}
@@ -81,7 +81,7 @@ class SystemUnderTest:
 
     @property
     def backend(self) -> str:
-        """What `evaluate` runs: "c", or "numpy" where there is no compiler."""
+        """Backend that `evaluate` runs: "c", or "numpy" where there is no compiler."""
         return "c" if find_compiler() is not None else "numpy"
 
     def demand_numbers(self) -> None:
@@ -97,7 +97,7 @@ class SystemUnderTest:
 
     @cached_property
     def inputs(self) -> np.ndarray:
-        """What inputs are while nothing else is said, (n_in,)."""
+        """Default values of inputs, (n_in,)."""
         initial = self.module.metadata.initial
         return np.array([initial.get(name, 0.0) for name in self.module.metadata.inputs], dtype=float)
 

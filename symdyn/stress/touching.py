@@ -28,7 +28,7 @@ G, RTOL = 9.81, 1e-12
 # Errors of a step by all entries of the state, and of how far rounding and the location of a switch go besides, of the state.
 PER_STEP, BESIDES = 4.0, 1e-13
 TILT = math.radians(30)
-# How far below the angle of friction a block sticks, and above it slides.
+# Distance from the angle of friction at which a block sticks below it, and slides above it.
 NEAR = 1e-6
 
 

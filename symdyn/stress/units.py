@@ -20,7 +20,7 @@ from symdyn.stress.system_under_test import EPS, RTOL, SystemUnderTest
 _BASE: dict[str, tuple[int, int, int]] = {
     "1": (0, 0, 0), "rad": (0, 0, 0), "deg": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2),
     "J": (1, 2, -2), "W": (1, 2, -3), "Pa": (1, -1, -2), "Hz": (0, 0, -1)}
-# How far the exact equations may be from scaling: they are known to 32 digits.
+# Largest error of scaling of the exact equations: they are known to 32 digits.
 SCALES = 1e-20
 
 
@@ -34,7 +34,7 @@ class Units:
     time: float
 
     def factor(self, unit: str) -> float:
-        """What a number in an SI unit is multiplied by. Raises NotApplicable for a unit that is not known."""
+        """Factor by which a number in an SI unit is multiplied. Raises NotApplicable for a unit that is not known."""
         m, l, t = powers(unit)
         return float(self.mass**m * self.length**l * self.time**t)
 
@@ -46,7 +46,7 @@ DECIMAL = Units("mm, t, s", 1e-3, 1e3, 1.0)
 
 
 def powers(unit: str) -> tuple[int, int, int]:
-    """Of mass, length, time, from text such as "N m s/rad". Raises NotApplicable for what is not known."""
+    """Powers of mass, length, time, from text such as "N m s/rad". Raises NotApplicable for what is not known."""
     total = np.zeros(3, dtype=int)
     for k, part in enumerate(unit.split("/")):
         for word in part.split():
@@ -58,7 +58,7 @@ def powers(unit: str) -> tuple[int, int, int]:
 
 
 def factors(tested: SystemUnderTest, names: Sequence[str], units: Units) -> np.ndarray:
-    """What numbers are multiplied by. Raises NotApplicable for a symbol without a unit."""
+    """Factors by which numbers are multiplied. Raises NotApplicable for a symbol without a unit."""
     known = tested.module.metadata.units
     missing = [name for name in names if name not in known]
     if missing:
