@@ -1,8 +1,8 @@
-"""Which combinations of unknowns data and priors determine, with their covariance.
+"""Combinations of unknowns that data and priors determine, with their covariance.
 
 With D = U S V^T of the scaled derivatives of the data, singular values below a part of the largest are taken for zero: the
-sensitivities are no more exact. Priors are exact, so that they determine what they act on, however little it is. What is then
-left open is the null space of both. Source: Golub and Van Loan, Matrix Computations, 4th ed., 5.5 (rank-deficient least squares).
+sensitivities are no more exact. Priors are exact, so that they determine what they act on, however little it is. The null space
+of both is then left open. Source: Golub and Van Loan, Matrix Computations, 4th ed., 5.5 (rank-deficient least squares).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOUCHED = 1e-6
 
 @dataclass(frozen=True)
 class Determined:
-    """What rows of data and priors say of unknowns.
+    """Information of rows of data and priors on unknowns.
 
     covariance   (n, n), of the combinations that are determined; NaN in rows and columns of unknowns that open ones touch
     open_ones    orthonormal combinations of unknowns, relative to their scale, that are not determined, (k, n)

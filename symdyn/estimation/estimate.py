@@ -22,7 +22,7 @@ _SHARE = 1e-3
 
 
 class Estimate:
-    """What estimates have in common: the module, values (label -> value), covariance (n, n) in this order, degrees of freedom
+    """Common part of estimates: the module, values (label -> value), covariance (n, n) in this order, degrees of freedom
     (residuals less unknowns), and known_noise, whether the noise of the data was given."""
 
     module: Module

@@ -42,7 +42,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Measured:
-    """What an experiment measured, checked: name -> values (n_t, ...); n: number of values that are there."""
+    """Measured values of an experiment, checked: name -> values (n_t, ...); n: number of values that are there."""
 
     experiment: Experiment
     t: np.ndarray

@@ -83,7 +83,7 @@ def fit(module: Module, data: Experiment | Sequence[Experiment], parameters: Nam
 
 def _problem(module: Module, experiments: list[Measured], parameters: Any, initial: Any, bounds: Any, priors: Any, noise: Any,
              start: Any, rtol: float, method: str) -> Problem:
-    """What is fitted, checked. Raises ArgumentError with all faults."""
+    """Problem to fit, checked. Raises ArgumentError with all faults."""
     faults: list[str] = []
     metadata = module.metadata
     named = _names(parameters, metadata.parameters, "parameters", "parameter", faults)

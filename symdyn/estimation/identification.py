@@ -1,4 +1,4 @@
-"""What was identified from measured forces, how sure it is, and what the data leave open."""
+"""Parameters identified from measured forces, their uncertainty, and what the data leave open."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ def _lengths(A: np.ndarray) -> np.ndarray:
 
 
 def _open(sizes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Which singular values leave a combination open, and the condition of the others."""
+    """Mask of the singular values that leave a combination open, and the condition of the others."""
     is_open = sizes <= UNDETERMINED * sizes[0] if len(sizes) and sizes[0] > 0 else np.ones(len(sizes), dtype=bool)
     return is_open, float(sizes[0] / sizes[~is_open].min()) if (~is_open).any() else np.inf
 

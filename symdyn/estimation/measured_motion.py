@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 ORDER = 4
 # Kept samples per period of the cutoff frequency, and periods of it that are left out at both ends.
 KEPT, LEFT_OUT = 2.0, 2.0
-# How equal steps of time must be for a filter.
+# Largest relative difference of steps of time for a filter.
 EVEN = 1e-6
 
 

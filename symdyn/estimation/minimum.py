@@ -34,8 +34,8 @@ PRECISION, _FLAT = 1e-10, 1e-13
 _SETTLED, _ROUNDS, _TRUSTED = 1e-6, 60, 1e-3
 # Values are next to a bound within this part of their scale, and on it within the second.
 _NEXT, _ON = 1e-3, 1e-9
-# What the sum of squares of residuals, in units of noise, may rise by on the way to the guess or to a bound, relative to itself
-# or to the number of residuals.
+# Largest rise of the sum of squares of residuals, in units of noise, on the way to the guess or to a bound, relative to itself or
+# to the number of residuals.
 _SAME = 1e-6
 # Open combinations are at the guess within this part of the way; weights of the rows for it; most steps to there, and how much
 # of the gradient a step takes.
@@ -165,7 +165,7 @@ def _lost(problem: Problem, point: Point, known: Determined, covariance: np.ndar
 
 
 def _determined(problem: Problem, point: Point) -> Determined:
-    """Of what is not held on bounds."""
+    """Determined combinations of the unknowns that are not held on bounds."""
     free, n_priors = ~point.held, len(problem.priors)
     sizes = np.maximum(np.abs(point.x), _SIZE * problem.scale)
     D, P = np.split(point.derivatives[:, free], [len(point.residuals) - n_priors])

@@ -1,4 +1,4 @@
-"""What is fitted: residuals of all experiments and priors as functions of the unknowns, with their derivatives.
+"""Problem of a fit: residuals of all experiments and priors as functions of the unknowns, with their derivatives.
 
 The residuals are (model - measured)/noise, and (value - mean)/standard deviation of priors. Their derivatives are the
 sensitivities of the motion, integrated along with it, so that a step costs one run an experiment.
@@ -31,7 +31,7 @@ _STEPS, _TIMES = 10_000, 50
 
 @dataclass(frozen=True)
 class Unknown:
-    """What is fitted: a parameter, or an initial value "q1(0)" of one experiment of `of`."""
+    """Unknown of a fit: a parameter, or an initial value "q1(0)" of one experiment of `of`."""
 
     name: str
     experiment: int | None
@@ -45,7 +45,7 @@ class Unknown:
 
     @property
     def asked(self) -> str:
-        """What `simulate` is asked for."""
+        """Arguments requested from `simulate`."""
         return self.name
 
     @property
@@ -123,13 +123,13 @@ class Problem:
 
     @cached_property
     def rows(self) -> dict[str, np.ndarray]:
-        """Which residuals are those of what was measured, (n,) of bool by name; those of priors are none of them."""
+        """Masks of the residuals of measured values, (n,) of bool by name; those of priors are none of them."""
         parts = [(name, int(present.sum())) for _, name, _, present in self._parts()]
         of_priors = np.zeros(len(self.priors), dtype=bool)
         return {name: np.concatenate([*(np.full(n, one == name) for one, n in parts), of_priors]) for name in self.noise}
 
     def motions(self, values: np.ndarray) -> tuple[Solution, ...]:
-        """Of the experiments, with values that can be computed."""
+        """Motions of the experiments, with values that can be computed."""
         self._moved(values)
         return tuple(self._motions)
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 
-# By what the weight of the divergence falls from stage to stage; the decrement squared of Newton's method at which a stage ends,
-# and the last one, relative to the weight; steps at most.
+# Factor by which the weight of the divergence falls from stage to stage; the decrement squared of Newton's method at which a
+# stage ends, and the last one, relative to the weight; steps at most.
 FALL, STAGE, END, MOST_STEPS = 0.1, 0.01, 1e-10, 1000
 # The part of a step below which none is tried, and the decrement that rounding of the sum may leave then; that of one operation.
 LEAST_STEP, ROUNDING, EPS = 1e-12, 1e-12, float(np.finfo(float).eps)
@@ -83,7 +83,7 @@ def nearest(A: np.ndarray, b: np.ndarray, charts: list[Chart], weight: float) ->
 
     A   (n, 10 n_b + n_f) derivatives by the coordinates of the charts, and by n_f unknowns without a prior
 
-    What is kept of a body is the triangular W of 1 + X = W W^T, which stays accurate near the border. The weight falls in stages,
+    A body is stored as the triangular W of 1 + X = W W^T, which stays accurate near the border. The weight falls in stages,
     from one with which the nominal values are near, since Newton's method takes many steps where the minimum is near the border.
     Raises EvaluationError where there are too many.
     """

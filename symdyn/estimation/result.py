@@ -1,4 +1,4 @@
-"""What a fit found, how sure it is, and what the data leave open."""
+"""Results of a fit, their uncertainty, and what the data leave open."""
 
 from __future__ import annotations
 

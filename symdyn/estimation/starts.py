@@ -1,6 +1,6 @@
 """Starts of experiments on the constraints: a set of coordinates and speeds is kept, the constraints determine the others.
 
-What is kept is chosen once, so that the start is an implicit function of the unknowns with an exact derivative: with
+The kept coordinates are chosen once, so that the start is an implicit function of the unknowns with an exact derivative: with
 C(q, p, t) = 0 and the columns of C_q parted into those of kept and of dependent coordinates,
 C_q,dep dq_dep = -(C_q,kept dq_kept + C_p dp), and the same of C_dot(q, u, p, t) = 0 for the speeds. Euler parameters add a row
 for their norm each. Source: Wehage and Haug, J. Mech. Des. 104 (1982) 247-255 (partitioning of coordinates).
@@ -110,7 +110,7 @@ class Start:
         return self._with_speeds(x, p)
 
     def derivative(self, x: np.ndarray, p: np.ndarray, by: str) -> np.ndarray:
-        """Of the start by a parameter, or by the initial value of a state, (n_x,)."""
+        """Derivative of the start by a parameter, or by the initial value of a state, (n_x,)."""
         metadata = self._module.metadata
         result = np.zeros(len(x))
         of_parameters = np.zeros(len(p))

@@ -27,7 +27,7 @@ FIRST, HALVED = 16, 14
 
 
 class OverTime:
-    """What has states (n_x,) and inputs (n_in,) of a module over time, by polynomials."""
+    """States (n_x,) and inputs (n_in,) of a module over time, by polynomials."""
 
     module: Module
     t: np.ndarray

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 MOTION = "the equation of motion of "
-# What a condition whose variables are all given may lack, of its size.
+# Largest violation of a condition whose variables are all given, relative to its size.
 GIVEN = 1e-7
-# How far from the guess, of the sizes of variables, the cost and conditions have their sizes, too: both may be flat at the guess.
+# Distance from the guess, in sizes of variables, at which sizes of the cost and conditions are taken, too: both may be flat at
+# the guess.
 NEARBY = 0.1
 # Relative errors of integrals of the cost along polynomials, and along motions simulated back, whose states have errors.
 EXACT, SIMULATED = 1e-11, 1e-8
@@ -143,8 +144,8 @@ class Discretized:
         return self.z[:n], np.clip(self.z[:n] + NEARBY * self.z_sizes[:n], z_least[:n], z_most[:n])
 
     def _sizes_of_rows(self, program: Program) -> np.ndarray:
-        """What variables of their sizes change each row by, (m,): by its linear part; without one by its derivatives, the largest
-        at all times; else what it is."""
+        """Change of each row by variables of their sizes, (m,): by its linear part; without one by its derivatives, the largest
+        at all times; else its value."""
         linear = abs(program.L) @ sp.diags(self.z_sizes[:program.n])
         result = np.asarray(linear.max(axis=1).todense()).ravel() if program.L.nnz else np.zeros(program.m)
         curved = np.zeros(program.m)
@@ -161,7 +162,7 @@ class Discretized:
         return unit(result)
 
     def _size_of_cost(self) -> float:
-        """What variables of their sizes change the cost by, at the guess or nearby."""
+        """Change of the cost by variables of their sizes, at the guess or nearby."""
         if self.elastic:
             return 1.0
         program = self.program
@@ -256,7 +257,7 @@ class Discretized:
                        program.g_most, program.labels)
 
     def text(self, program: Program, row: int) -> str:
-        """What a row of the constraints is, and when, by the duration of the guess."""
+        """Meaning of a row of the constraints, and its time, by the duration of the guess."""
         text, share = program.what(row)
         return text if np.isnan(share) else f"{text} at t = {self.problem.t0 + share * self.guess.T:.4g} s"
 
@@ -269,7 +270,7 @@ class Discretized:
         return Field(self.dynamics, self.problem.integrand, self.problem.t0, shares)
 
     def flow(self, steps: int | None = None) -> Rows:
-        """What the defects are made of: rates at points, or changes across the intervals of shooting."""
+        """Rows that the defects are made of: rates at points, or changes across the intervals of shooting."""
         field = self.field(self.mesh.shares)
         return Steps(field, np.diff(self.mesh.breaks), steps or self.steps, self.held) if self.mesh.kind == "shooting" else field
 
@@ -448,8 +449,8 @@ class Discretized:
 
     def cost_along(self, z: np.ndarray, accuracy: float) -> tuple[float, np.ndarray]:
         """The cost integrated along the polynomials, and by how much the quadrature of each interval differs from that, (K,),
-        relative to the cost: the integral of its absolute value, and the end. What is below the accuracy, of the size by which
-        the cost changes, counts nothing."""
+        relative to the cost: the integral of its absolute value, and the end. Changes below the accuracy, of the size by which
+        the cost changes, do not count."""
         mesh, motion = self.mesh, self.motion(z)
         x, u = self.polynomials(motion)
         rate = lambda shares: motion.T * self._integrand(motion, shares, x(shares), u(shares))
@@ -486,8 +487,8 @@ class Discretized:
         return float(self.problem.end_cost.values(at[None, :])[0, 0])
 
     def transversal(self, motion: Motion) -> float:
-        """How far the normals of the constraints at this motion are from lying in those of the guess: the smallest singular value
-        of their products, 1 for none."""
+        """Smallest singular value of the products of the normals of the constraints at this motion with those of the guess, 1 for
+        none."""
         t = self.problem.t0 + self.mesh.breaks[1:] * motion.T
         now = normals(self.problem.module, t, motion.X[self.mesh.ends[1:]], motion.p, self.rows_of_loops)
         return float(np.linalg.svd(np.einsum("kxi,kxj->kij", self.normals, now), compute_uv=False).min())

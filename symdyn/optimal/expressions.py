@@ -71,5 +71,5 @@ class Expressions:
 
 
 def _present(entries: np.ndarray) -> np.ndarray:
-    """Which entries are not zero by structure."""
+    """Mask of the entries that are not zero by structure."""
     return np.array([not is_zero(e) for e in entries.ravel()], dtype=bool).reshape(entries.shape)

@@ -1,4 +1,4 @@
-"""What is integrated along a motion: the rates of the state and of the cost, times the duration, at many points at once.
+"""Integrands along a motion: the rates of the state and of the cost, times the duration, at many points at once.
 
 A point has the arguments y = [x; inputs; free parameters; duration]. Functions of symdyn's compiled code are called once for all
 points; their derivatives are exact.
@@ -84,7 +84,7 @@ class Groups:
         self.corner = (self._at[:, None], self._at)
 
     def columns(self, result: np.ndarray) -> np.ndarray:
-        """Of derivatives (..., whole) those by the arguments, (..., n)."""
+        """Derivatives by the arguments, (..., n), among derivatives (..., whole)."""
         made = np.zeros((*result.shape[:-1], self.n), dtype=result.dtype)
         made[..., self._at] = result[..., self.kept]
         return made

@@ -17,11 +17,11 @@ from symdyn.runtime.raised import InputRaised
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Of differences of derivatives, relative to 1 and the argument: a third of the digits is best for central ones.
+# Step of differences of derivatives, relative to 1 and the argument: a third of the digits is best for central ones.
 STEP = float(np.finfo(float).eps) ** (1 / 3)
 # Steps of differences of values, likewise, and what derivatives may differ from them by, relative.
 DIFFERENCES, NEAR = (1e-4, 1e-5), 1e-4
-# What a function may raise beyond where it is defined: steps that lead there are not taken.
+# Errors that a function may raise beyond where it is defined: steps that lead there are not taken.
 OF_NUMBERS = (ArithmeticError, ValueError)
 
 
@@ -142,7 +142,7 @@ class WithFunctions:
 
     def _of_functions(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (N,) of all functions and their derivatives (N, n) by the state and free parameters; NaN where they are not
-        finite. What is no matter of numbers, such as a name that is not there, is raised."""
+        finite. Errors that numbers do not cause, such as a missing name, are raised."""
         value, slopes = np.zeros(len(at)), np.zeros((len(at), len(self._by)))
         for k, row in enumerate(at):
             for function in self.functions:

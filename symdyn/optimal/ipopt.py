@@ -15,13 +15,13 @@ import numpy as np
 from symdyn.errors import ArgumentError, MissingExtra
 from symdyn.optimal.program import Scaled
 
-# What IPOPT returns at a solution.
+# Status that IPOPT returns at a solution.
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a solver found: z (n,), cost, multipliers of g (m,) and of the bounds of z (n,): those of f + multipliers^T g.
+    """Solution of a solver: z (n,), cost, multipliers of g (m,) and of the bounds of z (n,): those of f + multipliers^T g.
 
     solved, message   whether it ended at a minimum, and why it ended
     """

@@ -2,7 +2,7 @@
 
 The rates of the state keep the constraints by themselves, along with the defects they would be too many equations. So the defects
 at the end of each interval have as many corrections more, along the normals of the constraints, as there are constraints there:
-they are of the size of the error of the mesh. Of dependent constraints an independent set is kept.
+they are of the size of the error of the mesh. An independent set of dependent constraints is kept.
 Source: Posa, Kuindersma and Tedrake, Optimization and stabilization of trajectories for constrained dynamical systems, ICRA 2016.
 """
 
@@ -100,7 +100,7 @@ def unit_groups(module: Module) -> list[list[int]]:
 
 
 def independent_rows(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Which rows of [C; C_dot] imply the others at a state: velocity constraints have no row among those of C."""
+    """Indices of the rows of [C; C_dot] imply the others at a state: velocity constraints have no row among those of C."""
     n_c = len(module.metadata.constraints)
     if not n_c:
         return np.zeros(0, dtype=int)

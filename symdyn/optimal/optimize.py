@@ -48,17 +48,17 @@ METHODS = ("ipopt", *scipy_solvers.METHODS)
 PARTS, MOST_INTERVALS, MOST_STEPS = 4, 2000, 512
 # Degrees of Radau's method: the inputs between its points are at most cubic, as tables have them.
 DEGREES = (1, 2, 3, 4)
-# What the elastic problem must miss for the problem to be infeasible, of the sizes of conditions.
+# Violation of the elastic problem, in sizes of conditions, from which on the problem is infeasible.
 MISSED = 1e-6
-# What a motion simulated back may differ by without a warning, relative: without a tolerance; with one, its root.
+# Relative difference of a motion simulated back that gives no warning: without a tolerance; with one, its root.
 APART = 0.01
-# What cost and conditions may change by where nothing depends on a value.
+# Changes of cost and conditions up to which nothing depends on a value.
 UNCHANGED = 1e-12
 # A cost that is as far below that of the guess, in units of it and of its size, has fallen without bound.
 FALLEN = 1e8
 # A motion that is so many times as large as it was taken for is found once more, with sizes by itself.
 GROWN = 100.0
-# Of normals at the guess and at the solution: where the smallest singular value of their products is less, they are taken again.
+# Normals at the guess are taken again where the smallest singular value of their products with those at the solution is less.
 TRANSVERSAL = 0.5
 
 
@@ -158,7 +158,7 @@ def _on_states(problem: Problem, alone: slice = slice(0)) -> list[str]:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """How it is optimized, checked."""
+    """Choices of the optimization, checked."""
 
     kind: str | None
     breaks: np.ndarray
@@ -290,7 +290,7 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
 
 
 def _middle(bounds: np.ndarray, left_out: np.ndarray) -> np.ndarray:
-    """Of bounds (2, n): their middle, the finite one, or what stands for none."""
+    """Middle of bounds (2, n), the finite one, or the value that stands for none."""
     low, high = bounds
     both = np.isfinite(low) & np.isfinite(high)
     result = np.where(both, (np.where(both, low, 0) + np.where(both, high, 0)) / 2, left_out)
@@ -329,7 +329,7 @@ def _row(value: Any, name: str, faults: Faults) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class _Solved:
-    """What was found on a mesh, with the errors of its intervals, (K,): of states and of the cost; along: the cost integrated
+    """Solution on a mesh, with the errors of its intervals, (K,): of states and of the cost; along: the cost integrated
     along the motion; records: of this mesh and those before."""
 
     made: Discretized
@@ -401,7 +401,7 @@ class _Search:
         return optimum
 
     def _apart(self, optimum: Optimum, solved: _Solved) -> str:
-        """In what the motion simulated back, and the cost along it, differ by too much; nothing if they do not."""
+        """Quantities in which the motion simulated back, and the cost along it, differ by too much; nothing if they do not."""
         tolerance = self.chosen.tolerance
         most = APART if tolerance is None else np.sqrt(tolerance)
         if optimum.simulated is None or not optimum.simulated.success:
@@ -420,13 +420,13 @@ class _Search:
         return "; ".join(result) + (f" (allowed is {most:.2g} of the size of a state, or of the cost)" if result else "")
 
     def _finer(self, optimum: Optimum) -> str:
-        """What to do about a motion that is not exact enough."""
+        """Advice about a motion that is not exact enough."""
         if self.chosen.tolerance is None:
             return f"pass a tolerance, with which the mesh is refined, or more intervals{self._radau_instead()}"
         return f"pass a smaller tolerance, or keep an unstable motion by a regulator, optimum.lqr{self._radau_instead()}"
 
     def _radau_instead(self) -> str:
-        """What to take in place of Hermite and Simpson's method where equalities hold states alone."""
+        """Advice to replace Hermite and Simpson's method where equalities hold states alone."""
         held = _on_states(self.problem) if self.chosen.kind == "hermite-simpson" else []
         return f"; or leave transcription out: inputs of Hermite and Simpson go to and fro under {held[0]}" if held else ""
 
@@ -584,7 +584,7 @@ class _Search:
         return "Hermite-Simpson" if mesh.kind == "hermite-simpson" else "multiple shooting"
 
     def _failed(self, solved: _Solved, before: _Solved | None) -> NoOptimum:
-        """What to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
+        """Error to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
         owner, made, result = self.problem.module.name, solved.made, solved.found
         optimum = self._optimum(before or solved)
         n = sum(record.iterations for record in solved.records)
@@ -614,11 +614,11 @@ class _Search:
                              f"{self._worst(made, result.z)}{self._radau_instead()}", optimum)
         texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
                 for k in np.argsort(-parts)[:4] if parts[k] > MISSED]
-        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",
+        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. The nearest motion violates some: {'; '.join(texts)}",
                          optimum)
 
     def _fallen(self, made: Discretized, result: Found) -> str:
-        """What to say of a cost that goes to minus infinity; nothing where it does not."""
+        """Message about a cost that goes to minus infinity; nothing where it does not."""
         begin = made.program.f(made.z)
         if result.cost > begin - FALLEN * (made.scaled.cost_size + abs(begin)) or np.isnan(result.cost):
             return ""
@@ -634,7 +634,7 @@ class _Search:
                 + (f", and these have no bounds: {reached}; give them bounds, or a cost that grows with them" if reached else ""))
 
     def _kinked(self) -> str:
-        """What to say of a cost with kinks, at which solvers that go by derivatives hardly end."""
+        """Message about a cost with kinks, at which solvers that go by derivatives hardly end."""
         kinks, inputs = self.problem.kinks, self.problem.module.metadata.inputs
         if not kinks:
             return ""

@@ -1,4 +1,4 @@
-"""What is optimized, checked: bounds, ends, constraints and costs, in the order of the module's names."""
+"""Problem of optimization, checked: bounds, ends, constraints and costs, in the order of the module's names."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FREE = (-np.inf, np.inf)
 # Characters of a condition that messages and multipliers name it by.
 LONGEST = 120
-# What has kinks or jumps.
+# Names of functions with kinks or jumps.
 KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.Piecewise, sp.floor, sp.ceiling)
 
 
@@ -348,7 +348,7 @@ def _conditions(given: Any, what: str, read: _Read) -> Conditions | None:
 
 
 def _timed(module: Module, p: np.ndarray) -> frozenset[str]:
-    """Which of rates, outputs and constraints depend on t."""
+    """Those of rates, outputs and constraints that depend on t."""
     groups = {"rhs": ("rhs",), "outputs": ("outputs",) if module.metadata.outputs else (),
               "C": ("C", "C_dot") if module.metadata.constraints else ()}
     return frozenset(what for what, names in groups.items() if any(_depends_on_time(module, name, p) for name in names))

@@ -42,7 +42,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Label:
-    """What rows of g are: text and entry, with the time of each as a share of the duration (NaN: of no time), from row `first`
+    """Labels of rows of g: text and entry, with the time of each as a share of the duration (NaN: of no time), from row `first`
     on; soft: whether the user requested it."""
 
     text: str
@@ -94,7 +94,7 @@ class Program:
         return result
 
     def gradient(self, z: np.ndarray) -> np.ndarray:
-        """Of the cost (n,)."""
+        """Gradient of the cost (n,)."""
         result = np.zeros(self.n)
         for (at, columns, factors), J in zip(self._of_cost, self._all("jacobian", z), strict=True):
             if len(at):
@@ -102,14 +102,14 @@ class Program:
         return result
 
     def jacobian(self, z: np.ndarray) -> np.ndarray:
-        """Of the constraints, the entries of the pattern (rows, colptr)."""
+        """Jacobian of the constraints, the entries of the pattern (rows, colptr)."""
         parts = [self._constant]
         for (at, factors), J in zip(self._of_constraints, self._all("jacobian", z), strict=True):
             parts.append(factors * J.ravel()[at])
         return np.bincount(self._jacobian_index, np.concatenate(parts), self.jacobian_nonzeros)
 
     def hessian(self, z: np.ndarray, cost: float, multipliers: np.ndarray) -> np.ndarray:
-        """Of cost f + multipliers^T g, the entries of the upper triangle's pattern."""
+        """Hessian of the cost f + multipliers^T g, the entries of the upper triangle's pattern."""
         self.evaluations["hessian"] += 1
         parts = []
         for block, (at, factors) in zip(self.blocks, self._of_hessian, strict=True):
@@ -200,7 +200,7 @@ class Program:
 
 def unit(sizes: np.ndarray) -> np.ndarray:
     """The next powers of 1024: units, like milli and kilo, in which sizes are near 1, and by which numbers are scaled without
-    rounding. What is of the size 1/32 to 32 stays as it is."""
+    rounding. A number of the size 1/32 to 32 stays as it is."""
     return np.asarray(np.exp2(PREFIX * np.round(np.log2(sizes) / PREFIX)))
 
 
@@ -229,15 +229,15 @@ class Scaled:
         return self.program.g(y * self.z_sizes) / self.g_sizes
 
     def gradient(self, y: np.ndarray) -> np.ndarray:
-        """Of the cost (n,)."""
+        """Gradient of the cost (n,)."""
         return self.program.gradient(y * self.z_sizes) * self.z_sizes / self.cost_size
 
     def jacobian(self, y: np.ndarray) -> np.ndarray:
-        """Of the constraints, the entries of the pattern."""
+        """Jacobian of the constraints, the entries of the pattern."""
         return self.program.jacobian(y * self.z_sizes) * self._of_jacobian
 
     def hessian(self, y: np.ndarray, cost: float, multipliers: np.ndarray) -> np.ndarray:
-        """Of cost f + multipliers^T g, the entries of the upper triangle's pattern."""
+        """Hessian of the cost f + multipliers^T g, the entries of the upper triangle's pattern."""
         return self.program.hessian(y * self.z_sizes, cost / self.cost_size, multipliers / self.g_sizes) * self._of_hessian
 
     def violations(self, y: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ def integrals(f: Callable[[np.ndarray], np.ndarray], breaks: np.ndarray, relativ
         halves = np.stack([begin, begin + h / 2], axis=1)
         fine, absolute = (part.reshape(-1, 2) for part in over(halves.ravel(), np.repeat(h / 2, 2)))
         both, of_both = fine.sum(axis=1), absolute.sum(axis=1)
-        # What is closed by now belongs to the whole size, too.
+        # Intervals that are closed by now belong to the whole size, too.
         least = relative * (np.nansum(size) + np.nansum(of_both))
         with np.errstate(invalid="ignore"):
             still = (np.abs(both - coarse) > least) & (halved < HALVED - 1)  # not a number: closed

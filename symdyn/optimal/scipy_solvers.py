@@ -12,7 +12,7 @@ from symdyn.optimal.ipopt import Found
 from symdyn.optimal.program import Scaled
 
 METHODS = ("slsqp", "trust-constr")
-# What constraints may lack at a solution of these methods, of the size of their bounds plus 1.
+# Violation of constraints at a solution of these methods, relative to the size of their bounds plus 1.
 FULFILLED = 1e-6
 
 

@@ -1,4 +1,4 @@
-"""How large states, inputs, parameters and the duration of a problem are, in their units: what is small is relative to these."""
+"""Sizes of states, inputs, parameters and the duration of a problem, in their units, to which small values are relative."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WIDE = 100.0
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Of states (n_x,), inputs (n_in,), free parameters (k,) and the duration, s, all positive."""
+    """Sizes of states (n_x,), inputs (n_in,), free parameters (k,) and the duration, s, all positive."""
 
     x: np.ndarray
     inputs: np.ndarray
@@ -33,11 +33,11 @@ class Sizes:
 
 
 def given_sizes(problem: Problem, dynamics: Dynamics, t: np.ndarray, at: np.ndarray) -> Sizes:
-    """By what is given, at times (N,) and arguments (N, n) of the guess.
+    """Sizes by what is given, at times (N,) and arguments (N, n) of the guess.
 
     A state has the largest value of start, end and guess; without one that of its bounds; a coordinate else what the equations
     move it by in the duration, or the size of other coordinates. A speed is at least what its coordinates need in the duration,
-    an input its bounds, or at least what accelerations like that need. What has no size by all this has 1.
+    an input its bounds, or at least what accelerations like that need. A variable without a size by all this has 1.
     """
     of, sizes = problem.of, problem.module.metadata.sizes
     T = float(at[0, of.duration])
@@ -79,6 +79,7 @@ def _first(*sizes: np.ndarray) -> np.ndarray:
 
 
 def _needed(slopes: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """What changes rates (m,) by their sizes, by derivatives (m, n): (n,), 0 for what changes none."""
+    """Changes of variables that change rates (m,) by their sizes, by derivatives (m, n): (n,), 0 for a variable that changes
+    none."""
     size = np.linalg.norm(slopes / rates[:, None], axis=0)
     return np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)

@@ -1,4 +1,4 @@
-"""How a motion becomes numbers: points on a mesh, defects linear in states and rates, and the polynomials between points.
+"""Transcription of a motion to numbers: points on a mesh, defects linear in states and rates, and the polynomials between points.
 
 With states X at the points of the mesh and F, the rates times the duration at the points of the field,
 
@@ -197,7 +197,7 @@ def _differences(points: np.ndarray) -> np.ndarray:
 
 
 def _values(points: np.ndarray, at: float) -> np.ndarray:
-    """What takes values at points to the value of the polynomial through them."""
+    """Weights of values at points in the value of the polynomial through them."""
     return np.array([p(at) for p in _basis(points)])
 
 
