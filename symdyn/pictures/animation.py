@@ -93,5 +93,5 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
 
 
 def _passed(t: np.ndarray, now: float) -> int:
-    """How many of the times are over."""
+    """Number of the times that are over."""
     return int(np.searchsorted(t, now, "right") if t[-1] > t[0] else np.searchsorted(-t, -now, "right"))

@@ -23,9 +23,9 @@ HEAD, WIDTH, BEHIND, FULL = 0.25, 0.11, 0.16, 0.05
 # A torque about what a plane picture is seen along: an arc of so many corners around so much of a circle, whose radius is this
 # share of the arrow's length.
 _CORNERS, _AROUND, _RADIUS = 25, 1.5 * np.pi, 0.5
-# What is this much smaller than the largest force, or torque, is rounding.
+# A force or torque that is this much smaller than the largest one is rounding.
 _ROUNDING = 1e-9
-# What the layers are called, and their colours: readers with any kind of colour vision can tell them apart.
+# Names of the layers, and their colours: readers with any kind of colour vision can tell them apart.
 TITLES = {"forces": "forces in joints", "moments": "torques in joints", "loads": "forces of loads", "torques": "torques of loads",
           "weights": "weights", "contacts": "forces of contacts"}
 COLORS = {"forces": "#7C2D12", "moments": "#312E81", "loads": "#047857", "torques": "#7C3AED", "weights": "#64748B",
@@ -34,7 +34,7 @@ COLORS = {"forces": "#7C2D12", "moments": "#312E81", "loads": "#047857", "torque
 
 @dataclass(frozen=True)
 class Arrows:
-    """What of one kind acts over time.
+    """Forces or torques of one kind over time.
 
     layer    a key of TITLES
     names    of each of n arrows
@@ -159,7 +159,7 @@ def touching(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
 
 
 def names_of(solution: Solution) -> list[str]:
-    """What the contacts in `touching` are called."""
+    """Names of the contacts in `touching`."""
     about, count = solution.module.metadata, solution.module.shape(POINTS)[0] // 6
     names = [*(record.name for record in about.contacts), *(record.name for record in about.compliant)]
     return names if len(names) == count else [f"contact {k + 1}" for k in range(count)]

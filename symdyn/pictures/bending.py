@@ -1,4 +1,4 @@
-"""How flexible bodies bend in pictures: mode shapes times elastic coordinates."""
+"""Bending of flexible bodies in pictures: mode shapes times elastic coordinates."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from symdyn.statics.response import Response
 
 _WIDE = 5.0
-# Of outputs that share a colour.
+# Styles of outputs that share a colour.
 _DASHES = ("-", "--", ":", "-.")
 
 

@@ -25,15 +25,15 @@ from symdyn.shown import shown
 # Elevation and azimuth of the eye, degrees; on shapes it looks more from the side.
 VIEW = (22.0, -55.0)
 VIEW_OF_SOLIDS = (14.0, -58.0)
-# Of the axes' box before it is fitted.
+# Zoom of the axes' box before it is fitted.
 ZOOM = 0.79
-# Of flat ground, of the extent of the picture; how far its normal may be off a plane picture.
+# Thickness of flat ground, as a part of the extent of the picture; largest distance of its normal from a plane picture.
 _THICK, _UPRIGHT = 0.015, 1e-6
-# Of the legend of arrows: width of an entry and height of a line, inches.
+# Width of an entry and height of a line of the legend of arrows, inches.
 _ENTRY, _LINE = 2.0, 0.16
 # Width of a letter of the axes' numbers, points.
 _LETTER = 3.5
-# What is drawn over all shapes.
+# Order of what is drawn over all shapes.
 ABOVE = 1e6
 
 
@@ -205,7 +205,7 @@ def _arrows(axes: Any, drawing: Drawing, alpha: float) -> list[Any]:
 
 
 def explain(figure: Any, drawing: Drawing) -> None:
-    """What the colours of arrows mean, and how large the largest are, below all axes; nothing without forces besides contacts."""
+    """Explain the colours of arrows and the sizes of the largest ones below all axes; nothing without forces besides contacts."""
     if not any(one.arrows.layer != "contacts" for one in drawing.arrows):
         return
     lines = [Line2D([], [], color=one.arrows.color, linewidth=1.6) for one in drawing.arrows]

@@ -1,4 +1,4 @@
-"""What is drawn before what: pieces that lie behind come first, and what is under water before the water.
+"""Depth order of pieces: those that lie behind come first, and what is under water before the water.
 
 Convex pieces are ordered by the planes of their faces: if one of them has the other piece wholly on its outer side, then the
 other hides it where the eye is on that side, too, and is hidden by it otherwise. Pieces that stick into each other are parted by
@@ -44,7 +44,7 @@ class Camera:
         return np.asarray(way / np.linalg.norm(way))
 
     def distance(self, point: np.ndarray, way: np.ndarray) -> float:
-        """How far a point is from the eye, along the way to the eye from the middle of the picture; less an unknown."""
+        """Distance of a point from the eye, along the way to the eye from the middle of the picture; less an unknown."""
         return float(-way @ point) if self.eye[3] == 0 else float(np.linalg.norm(self.eye[:3] - point))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 _LEFT_OUT = 1e-9
-# What ellipsoids of inertia need of a module.
+# Functions of a module that ellipsoids of inertia need.
 _OF_ELLIPSOIDS = ("frames", "joint_points", "joint_axes", "inertial_parameters")
 
 
@@ -91,7 +91,7 @@ class Drawing:
 
     @property
     def axes(self) -> list[int]:
-        """Which axes of the n-frame are shown."""
+        """Axes of the n-frame that are shown."""
         return ["xyz".index(label) for label in self.labels]
 
     @property
@@ -101,7 +101,7 @@ class Drawing:
     @classmethod
     def of(cls, solution: Solution, forces: bool = False, span: tuple[float, float] | None = None,
            inertia: bool = False) -> Drawing | None:
-        """What can be drawn of a motion; None if the module gives no positions, or nothing moves.
+        """Drawing of a motion; None if the module gives no positions, or nothing moves.
 
         forces    with arrows of forces in joints, loads and weights; those of contacts are always there
         span      the part of the motion that is shown, s, and for which rails and what has no size are long enough; None: all
@@ -132,7 +132,7 @@ class Drawing:
                                      solids.reach() if solids is not None and solids.own else np.zeros((0, 3))])
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
         shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
-        # What moves in a plane is seen from the front.
+        # A mechanism that moves in a plane is seen from the front.
         if solids is not None and (solids.own or len(shown) != 2 or about.planar):
             shown = [0, 1] if about.planar else [0, 1, 2]
         if not shown:

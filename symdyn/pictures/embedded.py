@@ -92,7 +92,7 @@ def _square(drawing: Drawing) -> Figure:
 
 
 def _around(figure: Any) -> Bbox | None:
-    """What is drawn in axes of space, inches."""
+    """Box of what is drawn in axes of space, inches."""
     axes = figure.axes[0]
     if not hasattr(axes, "zaxis"):
         return None

@@ -1,4 +1,4 @@
-"""What a fit makes of measured values: both over time, and below what is left."""
+"""Measured values and their fit over time, and the residuals below."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def plot(fit: Fit, path: PathName | None = None) -> Figure:
 
 
 def _title(fit: Fit, letters: int) -> str:
-    """What was fitted, within some lines of so many letters, which end behind labels."""
+    """Title with the fitted unknowns, within some lines of so many letters, which end behind labels."""
     blank = "\N{NO-BREAK SPACE}"
     labels = [label.replace(" ", blank) for label in fit.values]
     lines: list[str] = []

@@ -15,7 +15,7 @@ from symdyn.pictures.ropes import POINTS, mooring, rope
 
 # Bands of a ball, and the turns of a coil with their points.
 _BANDS = 8
-# How far from its poles a ball is cut off, rad.
+# Angle from its poles at which a ball is cut off, rad.
 _POLE = 0.06
 # Corners around rods, and around what is as wide as it likes: wheels and bodies without a joint.
 _ROD, _WHEEL = 16, 48
@@ -96,7 +96,7 @@ class Forms:
 
     @classmethod
     def of(cls, m: Mechanism, inertia: bool = False) -> Forms:
-        """What is always shown of a mechanism; inertia: with the ellipsoids of inertia."""
+        """Forms of a mechanism that are always shown; inertia: with the ellipsoids of inertia."""
         layers = ("", "inertia") if inertia else ("",)
         with np.errstate(all="ignore"):
             items, length = looks_of(m)
@@ -104,7 +104,7 @@ class Forms:
                    m.anchors)
 
     def vertices(self, origins: np.ndarray, rotations: np.ndarray) -> list[np.ndarray]:
-        """Of every part at one time; origins (n_b + 1, 3) and rotations (n_b + 1, 3, 3), the last the ground's."""
+        """Vertices of every part at one time; origins (n_b + 1, 3) and rotations (n_b + 1, 3, 3), the last the ground's."""
         posed = self.hung.at(origins, rotations)
         return [form.place(posed, self.up) for form in self.forms]
 

@@ -1,4 +1,5 @@
-"""What contacts touch: planes, curves, surfaces, cams, hollows and balls, as far as bodies get, and how mooring lines hang."""
+"""Surfaces that contacts touch: planes, curves, surfaces, cams, hollows and balls, as far as bodies get, and how mooring lines
+hang."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from symdyn.pictures.meshes import Color, Part, line, prism, ribbon, sheet
 Ground = tuple[np.ndarray, float]
 
 COLOR = "#c4c9d1"
-# Of the mechanism's length: how far curves and surfaces go on beyond where bodies get, in a plane and in space; how thick and how
-# wide a curve is drawn.
+# Parts of the mechanism's length: how far curves and surfaces go on beyond where bodies get, in a plane and in space; how thick
+# and how wide a curve is drawn.
 _PLANAR, _SPATIAL, _THICK, _HALF = 2.0, 0.3, 0.05, 0.12
 # Stations of a curve for a length of the mechanism, of all at most; of a surface along its longer side.
 _FINE, _MOST, _GRID = 60, 3000, 40
@@ -38,7 +39,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around the bodies of a mechanism.
+    """Surroundings of the bodies of a mechanism.
 
     planes   of the ground, which stays where it is; floors: in space what of them is below the bodies
     parts    of curves and the like, in the axes of their bodies
@@ -89,7 +90,7 @@ class Reach:
 
 
 def surroundings_of(records: Sequence[Mapping[str, Any]], reach: Reach, own_ground: bool) -> Surroundings:
-    """What is seen of contacts and mooring lines.
+    """Visible parts of contacts and mooring lines.
 
     records      with numbers in place of None; own_ground: whether the user draws the ground
     """

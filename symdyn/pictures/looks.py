@@ -1,4 +1,4 @@
-"""What a mechanism looks like without a word from the user: solids from joints, points and inertia.
+"""Default look of a mechanism: solids from joints, points and inertia.
 
 Sizes follow from distances between points and from moments of inertia. Positions do not: every solid is given by points and axes
 that move, so that the same list holds at every configuration and for other values of the parameters.
@@ -24,13 +24,13 @@ _FLOATING = ("free", "planar", "custom", "modal")
 _SLIDING = ("prismatic", "cylindrical", "helical")
 # Closer than this, relative to the mechanism, are points that are the same; what counts as extended.
 _SAME, _EXTENT = 1e-6, 0.02
-# How much of a mooring line stills show, of the mechanism's length.
+# Length of a mooring line in stills, as a part of the mechanism's length.
 _LINE = 0.4
 # Radius of a link, of the mechanism's length.
 _RADIUS = 0.02
 # Length of a mechanism whose bodies have no extent, of how far they get.
 _WAY = 0.15
-# How much larger a block is that is all there is.
+# Factor by which a block is larger that is alone.
 _ALONE = 1.8
 # Half the length of a rail on which nothing has moved, of the mechanism's length.
 _RAIL = 0.5
@@ -200,7 +200,7 @@ def carriers(bodies: Sequence[str], joints: Sequence[str], joined: Sequence[tupl
 
 
 def up_of(down: Sequence[float], planar: bool) -> tuple[float, float, float]:
-    """What is above in the picture: the coordinate axis against gravity, else y in a plane and z in space."""
+    """Direction that points up in the picture: the coordinate axis against gravity, else y in a plane and z in space."""
     k = int(np.abs(down).argmax())
     if abs(down[k]) < 0.99 or (planar and k == 2):
         return (0.0, 1.0, 0.0) if planar else (0.0, 0.0, 1.0)
@@ -248,7 +248,7 @@ def looks_of(m: Mechanism) -> tuple[list[Item], float]:
 
 
 def length_of(m: Mechanism) -> float:
-    """How far points of the mechanism are apart, at most; of a single body its size, from its inertia. Bodies without any extent
+    """Largest distance of points of the mechanism; for a single body its size, from its inertia. Bodies without any extent
     are seen on their way."""
     apart = float(np.linalg.norm(np.ptp(m.near_points, axis=0)))
     extents = [0.0]
@@ -273,7 +273,7 @@ def ropes_of(names: Sequence[str], connections: Sequence[tuple[str, str, str, st
 
 
 def color_of_body(body: int) -> str:
-    """Of its index, or of the ground."""
+    """Colour of a body by its index, or of the ground."""
     return METAL if body == GROUND else PALETTE[body % len(PALETTE)]
 
 
@@ -365,7 +365,7 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
         if not extended:
             return [Item("rod", (ref, at_centre), (0.8 * r, 0.6 * r), color, name), sphere]
         along = way / distance
-        # Of a slender rod m l² / 12 about every axis across it; in a plane one of them is known.
+        # A slender rod has m l² / 12 about every axis across it; in a plane one of them is known.
         half = min(float(np.sqrt(3 * np.linalg.eigvalsh(moments)[-1])), 1.1 * distance)
         return [Item("rod", (ref, (body, *(centre + half * along))), (r, 0.65 * r), color, name)]
     if not extended:
@@ -418,7 +418,8 @@ def _rods(m: Mechanism, held: Sequence[tuple[Ref, np.ndarray, int]], r: float, c
 
 
 def _wheel(m: Mechanism, body: int, held: Sequence[tuple[Ref, np.ndarray, int]], r: float) -> Item:
-    """What touches with a round rim: a disc about its hinge, or about the axis of its inertia; a ball where that has none."""
+    """Body that touches with a round rim: a disc about its hinge, or about the axis of its inertia; a ball where that has
+    none."""
     color, name, radius, centre = color_of_body(body), m.bodies[body], m.wheels[body], m.centre(body)
     half = max(0.12 * radius, 0.5 * r)
     for ref, point, joint in held:

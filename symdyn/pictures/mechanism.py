@@ -157,7 +157,7 @@ def touched(m: Mechanism, frames: np.ndarray, at: np.ndarray) -> tuple[list[tupl
 
 
 def _travels(m: Mechanism, frames: np.ndarray) -> Sequence[tuple[float, float]]:
-    """How far the child of every joint gets along its axis: least and most, m."""
+    """Range of the child of every joint along its axis: least and greatest, m."""
     hung = Hung.of(m)
     frames = frames[np.unique(np.linspace(0, len(frames) - 1, _ROWS).astype(int))]
     still = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel()]), (len(frames), 1, 12))

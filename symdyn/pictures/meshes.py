@@ -159,7 +159,7 @@ def sheet(body: int, color: Color, grid: np.ndarray, every: int) -> Part:
 
 
 def prism(body: int, color: Color, outline: np.ndarray, half: float) -> Part:
-    """What is within a closed curve (n, 3), counter-clockwise around the origin, which sees all of it; half its thickness."""
+    """Prism within a closed curve (n, 3), counter-clockwise around the origin, which sees all of it; half its thickness."""
     n, up = len(outline), np.array([0.0, 0.0, half])
     vertices = np.concatenate([outline + up, outline - up, [up, -up]])
     a = np.arange(n)

@@ -1,4 +1,4 @@
-"""Which curves are shown together."""
+"""Curves that are shown together."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Curves that a reader can tell apart in one set of axes.
 MOST = len(LINES)
 GROUPS = ("coordinates", "speeds", "states", "inputs", "outputs", "energy")
-# How far coordinates are moved to see which joint they belong to, and what counts as moved.
+# Change of coordinates that shows which joint they belong to, and the least movement that counts.
 _STEP, _MOVED = 1e-4, 1e-9
 # The unit of outputs that are accelerations of points.
 _ACCELERATION = "m/s^2"

@@ -19,7 +19,7 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class BodyPoint:
-    """What an output gives of a point that is fixed on a body: "position" or "velocity"."""
+    """Quantity that an output gives of a point fixed on a body: "position" or "velocity"."""
 
     body: int
     quantity: str

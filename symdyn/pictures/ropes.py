@@ -21,7 +21,7 @@ _ROUNDS = 60
 def rope(a: np.ndarray, b: np.ndarray, length: float, up: np.ndarray) -> np.ndarray:
     """Points along it from a to b, (POINTS, 3), evenly by its length; up: the direction against which it hangs.
 
-    Of a catenary with the parameter c over a horizontal distance h and a height v: sqrt(length^2 - v^2) = 2 c sinh(h / 2 c).
+    A catenary with the parameter c over a horizontal distance h and a height v has sqrt(length^2 - v^2) = 2 c sinh(h / 2 c).
     """
     s = np.linspace(0.0, 1.0, POINTS)[:, None]
     way = b - a
@@ -52,7 +52,7 @@ def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float
             shown: float = np.inf) -> np.ndarray:
     """Points along a mooring line from its fairlead to its anchor, (POINTS, 3), evenly by the unstretched length of what hangs.
 
-    What lies on the seabed is straight.
+    The part on the seabed is straight.
 
     give    weight over EA; friction: with the seabed, where there is one; shown: how much of the line, from the fairlead, m
     Straight where no shape at rest is found, as where the fairlead is below the seabed.
@@ -68,7 +68,7 @@ def mooring(fairlead: np.ndarray, anchor: np.ndarray, length: float, give: float
     tense = min(lies, h / friction) if friction else lies
 
     def stretch(u: np.ndarray) -> np.ndarray:
-        """Of what lies within a length u of where the line touches down, over `give`."""
+        """Stretch within a length u of where the line touches down, over `give`."""
         return np.asarray(h * np.minimum(u, tense) - friction / 2 * np.minimum(u, tense) ** 2)
 
     end = 1.0 - share

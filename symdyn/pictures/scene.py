@@ -14,9 +14,9 @@ from symdyn.pictures.solids import Solids, Water
 _WATER_ALPHA = 0.38
 # Strips of water with waves: a wave length's, at most; the width of their edges; how much lighter crests are, and darker troughs.
 _PER_WAVE, _MOST_STRIPS, _SEAM, _CREST = 24, 240, 0.0, 0.3
-# Of a colour: what is left in the shade, and along edges.
+# Part of a colour that is left in the shade, and along edges.
 _SHADE, _EDGE = 0.5, 0.6
-# Of what is seen through: how much of it covers what is behind; the width of its outline.
+# Opacity of transparent parts; the width of their outline.
 _GLASS_ALPHA, _OUTLINE = 0.28, 0.9
 
 
@@ -107,7 +107,7 @@ class Scene(PolyCollection):
         return [*ground, *[others[k] for k in order([parts[k] for k in others], [self._places[k] for k in others], camera)]]
 
     def _glass(self, camera: Camera) -> tuple[_Pieces, _Pieces]:
-        """What is seen through: the areas within its outlines, and its lines, from back to front."""
+        """Transparent parts: the areas within its outlines, and its lines, from back to front."""
         areas, lines = _Pieces(1.0, self._opacity * _GLASS_ALPHA), _Pieces(self._opacity)
         glass = [(part, places) for part, places in zip(self._solids.parts, self._places, strict=True) if part.glass]
         if not glass:
@@ -149,7 +149,7 @@ class Scene(PolyCollection):
 
 
 def _between(corners: np.ndarray, along: np.ndarray, low: float, high: float) -> np.ndarray:
-    """What of a rectangle (4, 3) is between two lines across a direction; along: of its corners along it."""
+    """Part of a rectangle (4, 3) between two lines across a direction; along: of its corners along it."""
     ahead = cut(corners, along - low)[1] if (along < low).any() else corners
     way = np.linalg.lstsq(corners - corners[0], along - along[0], rcond=None)[0]
     places = (ahead - corners[0]) @ way + along[0]

@@ -83,7 +83,7 @@ def guess_skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarr
 
 
 def extent(*points: np.ndarray) -> float:
-    """How far points of one kind, (n_t, n, 3) each, are apart, m."""
+    """Largest distance of points of one kind, (n_t, n, 3) each, m."""
     return float(max(*[np.ptp(p, axis=(0, 1)).max() for p in points], 1e-12))
 
 

@@ -46,7 +46,7 @@ class Water:
         return np.array([np.cos(angle), np.sin(angle)])
 
     def elevation(self, time: float, along: np.ndarray) -> np.ndarray:
-        """How high the surface is above its level at places `along` the heading, m."""
+        """Height of the surface above its level at places `along` the heading, m."""
         if self.waves is None:
             return np.zeros_like(along)
         amplitude, frequency, length, _, ramp = self.waves
@@ -54,7 +54,7 @@ class Water:
         return np.asarray(grown * np.cos(frequency * time - 2 * np.pi / length * along))
 
     def heights(self, points: np.ndarray, time: float) -> np.ndarray:
-        """How high points (n, 3) are above the surface, m."""
+        """Heights of points (n, 3) above the surface, m."""
         return np.asarray(points[:, 2] - self.level - self.elevation(time, points[:, :2] @ self.heading))
 
 

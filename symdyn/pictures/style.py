@@ -1,4 +1,4 @@
-"""What curves and bodies have in common."""
+"""Style that curves and bodies have in common."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#B07D00", "#56B4E9", "#000
 
 
 def colors_of(count: int) -> list[Any]:
-    """Of so many curves; of many from a scale that gets lighter."""
+    """Colours of so many curves; of many from a scale that gets lighter."""
     if count > len(LINES):
         return list(colormaps["cividis"](np.linspace(0, 0.92, count)))
     return list(LINES[:count])
@@ -25,7 +25,7 @@ def colors_of(count: int) -> list[Any]:
 
 @dataclass(frozen=True)
 class Style:
-    """What a picture is made for.
+    """Purpose of a picture.
 
     width    of curves and grid, points; dashes: of curves one after the other; legend: size of its letters
     aside    whether legends stand on the right of their axes, else above; wide, high: of one set of axes, inches

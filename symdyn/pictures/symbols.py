@@ -44,7 +44,7 @@ def typeset(name: str) -> str:
 
 
 def axis_label(names: Sequence[str], title: str, unit: str) -> str:
-    """What an axis is called: up to three short symbols, else the title of its curves; with the unit.
+    """Label of an axis: up to three short symbols, else the title of its curves; with the unit.
 
     >>> axis_label(["q1", "q2"], "coordinates", "rad"), axis_label(["q_hook_1", "q_hook_2"], "coordinates", "rad")
     ('$q_{1}$, $q_{2}$ [rad]', 'coordinates [rad]')
@@ -57,7 +57,7 @@ def axis_label(names: Sequence[str], title: str, unit: str) -> str:
 
 
 def _letters(sign: str) -> int:
-    """How many letters and digits a typeset name shows."""
+    """Number of letters and digits that a typeset name shows."""
     without = re.sub(r"\\(mathrm|d?dot|_)|[${}_]", "", sign)
     return len(re.sub(r"\\[A-Za-z]+", "x", without))
 

@@ -59,7 +59,7 @@ def _checkpoint() -> None:
 
 
 def within(seconds: float, compute: Callable[[], Result]) -> Result:
-    """What `compute` returns, if it does within so many seconds.
+    """Result of `compute`, if it returns within so many seconds.
 
     The computation is interrupted between two steps of Python, in any thread and on any platform; a single long operation in C,
     such as a product of very long integers, ends first. Raises TimeUp.

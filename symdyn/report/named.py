@@ -26,7 +26,7 @@ from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Output, reachable
 
-# What has fewer operations is written out where it stands.
+# Expressions with fewer operations are written out where they stand.
 WORTH_A_NAME = 2
 # Operations of a page, above which the steps of the derivation are an alternative; terms above which they are the only one.
 PAGE, CLOSED = 600, 1200
@@ -144,7 +144,7 @@ def _of_derivation(output: Output, symbols: Mapping[Node, sp.Expr], labels: Mapp
 
 
 def _called(label: str) -> str:
-    """What a label of the derivation means: "w3_x" is the angular velocity of link 3, x; "" if it says nothing."""
+    """Meaning of a label of the derivation: "w3_x" is the angular velocity of link 3, x; "" if it says nothing."""
     result = re.fullmatch(r"([A-Za-z]+?)(\d+)_([xyz]+)", label)
     return f"{_LETTERS[result[1]]} of link {result[2]}, {result[3]}" if result and result[1] in _LETTERS else ""
 
@@ -172,7 +172,7 @@ class _BaseParameters:
         self.writer = writer
 
     def meaning(self, p: Polynomial) -> str:
-        """What a constant is in base parameters, where it is a sum of few."""
+        """Constant in base parameters, where it is a sum of few."""
         left = dict(p)
         result: list[sp.Expr] = []
         for name, own, leading in self.rows:
@@ -217,7 +217,7 @@ def _with_units(steps: list[Step], units: Mapping[sp.Basic, Dimension | None]) -
 
 
 def _repeated(entries: list[sp.Expr], names: Iterator[sp.Symbol]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
-    """What stands in several places under names, where it has two operations at least, and the entries in these."""
+    """Names for expressions that stand in several places and have two operations at least, and the entries in these names."""
     result, entries = sp.cse(entries, symbols=sp.numbered_symbols("p", cls=sp.Dummy), order="canonical")
     written: dict[sp.Symbol, sp.Expr] = {}
     products = []

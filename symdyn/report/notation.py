@@ -61,7 +61,7 @@ NOTATION = (
     Notation("E_bar", r"\bar{\mathbf{E}}", "(3, 4)", "omega in the body's axes = 2 E_bar p_dot"),
 )
 _LATEX = {row.code: row.latex for row in NOTATION}
-# What a derivation calls the entries of its vectors and matrices, link by link.
+# Labels of a derivation for the entries of its vectors and matrices, link by link.
 _OF_LINKS = {"w": r"\omega", "v": "v", "a": "a", "alpha": r"\alpha", "f": "f", "n": "n", "h": "h", "I": "I", "r": "r", "p": "p"}
 
 

@@ -153,7 +153,7 @@ def _recursion(equations: MotionEquations, tree: Tree) -> list[str]:
 
 
 def _link(equations: MotionEquations, tree: Tree, k: int, link: Link) -> list[str]:
-    """What the recursion takes of one link."""
+    """Quantities of one link that the recursion takes."""
     n = k + 1
     parent = r"\text{the ground}" if link.parent == GROUND else rf"\text{{link }} {link.parent + 1}"
     head = rf"&\textbf{{link {n}: {_text(link.name)}}} \text{{ on }} {parent} \text{{ by {_text(link.joint.name)}}}"
@@ -234,7 +234,7 @@ def _wide(value: sp.Matrix) -> float:
 
 
 def _height(lines: Sequence[str]) -> int:
-    """How many lines of text they are as high as."""
+    """Height of these in lines of text."""
     return sum(1 + line.count(r"\\") for line in lines)
 
 

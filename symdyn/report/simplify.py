@@ -1,8 +1,8 @@
 """Simplification for printing only; nothing on the way to numbers goes through here.
 
 Exact algebra writes an expression in its shortest form (symdyn.exact), within bounds on terms and not on time, so that the form
-is the same on every machine. What is too large for it, or has functions that it does not know, is searched by SymPy's methods
-within a time limit.
+is the same on every machine. Expressions that are too large for it, or have functions that it does not know, are searched by
+SymPy's methods within a time limit.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _collected(e: sp.Expr) -> dict[sp.Expr, sp.Expr]:
 def _general(e: sp.Expr) -> sp.Expr:
     """SymPy's own search, in which sums of angles take nearly all of the time; without products of sines there are none.
 
-    Equations of one mechanism repeat each other's parts: forms, links, quantities. What was found is kept, as SymPy does."""
+    Equations of one mechanism repeat each other's parts: forms, links, quantities. Results are cached, as SymPy does."""
     if sp.count_ops(e) > _SHORT:
         return e
     if _degree(e) > 1:

@@ -11,7 +11,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.tape.tape import Tape
 
-# What the report counts besides the standard functions where there are constraints.
+# Functions that the report counts besides the standard ones where there are constraints.
 OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", "reactions", "position_correction", "velocity_correction")
 # These grow with the square of the number of speeds, or faster: they are counted for so many speeds at most.
 DENSE, MOST_SPEEDS = ("mass_matrix", "J", "C_r"), 150

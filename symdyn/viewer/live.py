@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 # Configurations at which is looked where contacts are.
 _SAMPLES = 6
-# How far beyond its start a mechanism may get by its sliders, of its length.
+# Distance beyond its start that a mechanism may reach by its sliders, as a part of its length.
 _FURTHER = 1.0
-# What the page evaluates to place what is drawn, and to close loops.
+# Functions that the page evaluates to place shapes and to close loops.
 _POSES = ("frames", "positions", "joint_points", "joint_axes", "spring_points")
 _CLOSURE = ("C", "C_r", "N")
 
@@ -163,7 +163,7 @@ def _functions(equations: Equations, names: Sequence[str]) -> str:
 
 
 def _sliders(equations: Equations, values: dict[str, float], names: Sequence[str], length: float) -> list[dict[str, Any]]:
-    """What moves the mechanism: coordinates, and the parameters, inputs and time that its kinematics depend on."""
+    """Sliders that move the mechanism: coordinates, and the parameters, inputs and time that its kinematics depend on."""
     s = equations.symbols
     used = {leaf.args[1] for leaf in equations.tape(*names).inputs}
     shaped = "drawn_lengths" in equations.quantities

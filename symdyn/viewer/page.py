@@ -14,7 +14,7 @@ from symdyn.folders import templates_folder
 from symdyn.pages import page_environment, write_text
 from symdyn.runtime.paths import as_path
 
-# What the page runs, in the order in which its parts need each other.
+# Scripts of the page, in the order in which its parts need each other.
 _SCRIPTS = ("vectors.js", "renderer.js", "shapes.js", "source.js", "stage.js", "plots.js", "controls.js", "main.js")
 _HEIGHT = 640
 

@@ -23,9 +23,9 @@ from symdyn.viewer.scene import scene_of
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
-# What the eye does not see: of the mechanism's length, and of a turn in radians.
+# Changes that the eye does not see: of the mechanism's length, and of a turn in radians.
 _SEEN, _TURN = 1.5e-3, 3e-3
-# What the eye does not see of an arrow, of the largest.
+# Change of an arrow that the eye does not see, relative to the largest.
 _LONGER = 0.02
 # Rows of a motion, and of its curves, at most.
 _MOST, _CURVES = 40_000, 2_000

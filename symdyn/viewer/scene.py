@@ -1,4 +1,4 @@
-"""What a page draws, as plain data: solids by rules, shapes of the user's, water."""
+"""Scene that a page draws, as plain data: solids by rules, shapes of the user's, water."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from symdyn.pictures.solids import Water, color_of, water_of
 from symdyn.viewer.arrays import plain, text_of
 
 _GROUND_COLOR = "#9ca3af"
-# Of the mechanism's length: the radius of a line a point of print wide.
+# Radius of a line a point of print wide, as a part of the mechanism's length.
 _THREAD = 0.0012
 
 

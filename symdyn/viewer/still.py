@@ -28,7 +28,7 @@ _LEAST = 3.0
 _THICK, _GROUND_COLOR = 8.0, "#d1d5db"
 # Cosine to the eye below which a face is seen from its edge.
 _EDGEWISE = 1e-6
-# What is left of a colour on faces that are turned away from the light.
+# Part of a colour that is left on faces turned away from the light.
 _SHADE = 0.62
 
 # Depth, points, half the width in m, of a wire the width in pixels, colour, and what is drawn through the points.
@@ -129,7 +129,7 @@ def _of_record(m: Mechanism, record: Mapping[str, Any], axes: np.ndarray, name: 
 
 
 def _around(m: Mechanism, axes: np.ndarray) -> Iterator[Shape]:
-    """What contacts touch: the ground behind all bodies."""
+    """Surfaces that contacts touch: the ground behind all bodies."""
     for part in m.around.parts:
         o, R = _frame(m, part.body)
         for depth, points, wide, color, kind in _of_part(part, o + part.vertices @ R.T, str(to_hex(part.color)), axes):

@@ -1,4 +1,4 @@
-"""What a notebook shows of a System: a small picture, and tables of bodies, joints and parameters."""
+"""View of a System in a notebook: a small picture, and tables of bodies, joints and parameters."""
 
 from __future__ import annotations
 
