@@ -79,7 +79,7 @@ def _sides(e: sp.Basic) -> list[Any]:
 
 
 class Visits:
-    """Which conditions of branches hold at points, and a search for points in a branch."""
+    """Conditions of branches that hold at points, and a search for points in a branch."""
 
     def __init__(self, all_branches: Iterable[Branch], symbols: Iterable[sp.Symbol]) -> None:
         self.symbols = {s.name: s for s in symbols}

@@ -31,7 +31,7 @@ class Slide:
         return ", ".join(p for p in parts if p)
 
     def faults(self, what: str) -> list[str]:
-        """What cannot be the place of a formula."""
+        """Faults of the place of a formula."""
         return [*text(self.section, f"the section of {what}", empty=True), *text(self.title, f"the title of {what}", empty=True),
                 *_line(self.line, f"the line of {what}")]
 
@@ -61,7 +61,7 @@ class Erratum:
         _set(self, entries=tuple(map(as_tuple, entries)) if isinstance(entries, tuple) else entries)
 
     def faults(self, what: str) -> list[str]:
-        """What is missing; what: which erratum it is."""
+        """Missing entries; what: which erratum it is."""
         faults = text(self.why, f"`why` of {what}") + text(self.slip, f"`slip` of {what}", empty=True)
         if not isinstance(self.proof, Proof):
             faults.append(f"`proof` of {what} is {described(self.proof)}; pass one of symdyn.proofs")
@@ -332,7 +332,7 @@ def _line(value: Any, what: str) -> list[str]:
 
 
 def _meant(entries: Any) -> str:
-    """What was probably meant by entries that are no index tuples."""
+    """Hint at the probable meaning of entries that are no index tuples."""
     numbers = as_tuple(entries, Integral)
     if not isinstance(numbers, tuple) or not numbers or not all(map(is_count, numbers)):
         return ""

@@ -35,7 +35,7 @@ class Convention:
     to_slide: Callable[[Any], Any]
 
     def faults(self) -> list[str]:
-        """What is missing."""
+        """Missing entries."""
         name = f"the convention {self.name!r}" if isinstance(self.name, str) and self.name.strip() else "a convention"
         faults = text(self.name, f"the name of {name}")
         if isinstance(self.sentence, str) and not self.sentence.strip():

@@ -54,7 +54,7 @@ SAME = Decision(True, "the same after renaming", proved=True)
 
 
 def unformed(error: Exception) -> Decision:
-    """Of an entry that SymPy does not form with the values or symbols that are put into it."""
+    """Decision on an entry that SymPy does not form with the values or symbols that are put into it."""
     return Decision(None, f"SymPy cannot form it with real symbols: {error}")
 
 
@@ -180,7 +180,7 @@ class _Comparison:
 
 
 class _Entry:
-    """What was seen of a pair: points that agree, that are in doubt, one that differs; branches and the sizes of the symbols."""
+    """Observations of a pair: points that agree, that are in doubt, one that differs; branches and the sizes of the symbols."""
 
     def __init__(self, pair: tuple[sp.Expr, sp.Expr]) -> None:
         self.names = sorted(s.name for s in symbols_of(pair[0]) | symbols_of(pair[1]))
@@ -243,7 +243,7 @@ def _points(count: int) -> str:
 
 
 class _Floats:
-    """How far the floats in pairs of expressions reach: the sum of what the values change by, per relative change of each."""
+    """Reach of the floats in pairs of expressions: the sum of what the values change by, per relative change of each."""
 
     def __init__(self, pairs: list[tuple[sp.Expr, sp.Expr]]) -> None:
         self.symbols: dict[sp.Float, sp.Symbol] = {}
@@ -255,7 +255,7 @@ class _Floats:
         self.values = {symbol.name: float(number) for number, symbol in self.symbols.items()}
 
     def reach(self, k: int, point: dict[str, Any]) -> Any:
-        """Of pair k at a point; None where a value ends within the change of a float.
+        """Reach of pair k at a point; None where a value ends within the change of a float.
 
         At least the sum of the sizes of the terms: sums of floats leave rounding in coefficients that should have vanished.
         """

@@ -27,7 +27,7 @@ TINY, HUGE = (-9, -1), (1, 6)
 # Values near which formulas change their form or lose digits, and the powers of ten of the distances from them.
 SPECIAL = ("1/2", "1", "2", "pi/6", "pi/4", "pi/3", "pi/2", "pi", "2*pi")
 DISPLACED = (-9, -3)
-# Of a difference that is rounding nothing remains with twice the digits.
+# A difference that is rounding vanishes with twice the digits.
 REMAINDER = 1e-20
 
 

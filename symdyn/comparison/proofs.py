@@ -141,7 +141,7 @@ class Proof:
 
 
 def _residual(value: Any, again: Any, decimal: bool) -> Residual:
-    """Of a value, and of the same with twice the digits: rounding shrinks."""
+    """Residual of a value, and of the same with twice the digits: rounding shrinks."""
     size = float(abs(value))
     if decimal:
         return Residual(size, size <= ZERO_DECIMAL, size >= VISIBLE)
@@ -244,7 +244,7 @@ def dimensions(sentence: str, units: Named[Sequence[float]], unit: Sequence[floa
 
 
 def _relative(value: Any, scale: Any) -> Residual:
-    """Of a difference, compared with the size of what was subtracted."""
+    """Residual of a difference, compared with the size of what was subtracted."""
     size = float(abs(value) / scale) if scale else float(abs(value))
     return Residual(size, size <= ZERO_MEASURED, size >= VISIBLE)
 

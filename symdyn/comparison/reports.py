@@ -32,9 +32,9 @@ from symdyn.errors import ArgumentError
 from symdyn.report.latex import letters
 
 FILES = ("comparison.html", "comparison.tex", "errata.html", "errata.md")
-# What the pages say of their first column.
+# Explanation of the first column on the pages.
 PRINTED = ("\u201cPrinted\u201d is what the transcription of the slides as text holds, with what it may have lost or changed. "
-           "What it visibly lost is unreadable, and no error of a slide.")
+           "Visibly lost text is unreadable, and no error of a slide.")
 # Letters in a line of a column, and of a page.
 COLUMN, PAGE = 50, 106
 # The same of the list of errata.
@@ -82,7 +82,7 @@ def report(comparisons: Comparisons, name: str) -> str:
 
 @dataclass(frozen=True)
 class Pages:
-    """How LaTeX becomes what the report holds, and the colour of what is wrong."""
+    """Conversion of LaTeX to what the report holds, and the colour of errors."""
 
     typeset: Callable[[str], Any]
     color: str

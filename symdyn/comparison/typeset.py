@@ -92,7 +92,7 @@ class Lines:
     color: str = "#b00020"
 
     def of(self, value: Any, marked: Places = (), left: str = "") -> list[str]:
-        """Lines of `left = value`. Of a matrix the longest entries get names and stand below; where that is not enough, the
+        """Lines of `left = value`. The longest entries of a matrix get names and stand below; where that is not enough, the
         entries that are not zero are listed. Equations of matrices are listed row by row."""
         start = f"{left} = " if left else ""
         if width(value) + letters(start) <= self.room:
@@ -147,7 +147,7 @@ def _named(index: tuple[int, ...]) -> str:
 
 
 def where_latex(formula: FormulaResult) -> list[str]:
-    """What was put into both sides before they were compared, symbol by symbol."""
+    """Substitutions in both sides before they were compared, symbol by symbol."""
     return [f"{_symbol(name)} = {_entry(e)}" for name, e in formula.where]
 
 
@@ -175,7 +175,7 @@ def marked(formula: FormulaResult) -> set[tuple[int, ...]]:
 
 @dataclass(frozen=True)
 class Correction:
-    """What is printed and what is right: an entry with its place, or the whole formula with the places that are wrong."""
+    """Printed and right form: an entry with its place, or the whole formula with the places that are wrong."""
 
     place: str
     printed: Any
@@ -207,7 +207,7 @@ def mathml(latex: str) -> str:
     return _OPERATOR.sub("<mo>", _ENTITY.sub(_character, str(convert(latex))))
 
 
-# What a browser knows of brackets by itself, and characters by number: half of a page.
+# Attributes of brackets that browsers assume by themselves, and characters by number: half of a page.
 _OPERATOR = re.compile(r'<mo stretchy="true" fence="true" form="(?:prefix|postfix)">')
 _ENTITY = re.compile(r"&#x([0-9A-F]+);")
 

@@ -1,4 +1,4 @@
-"""What a formula is compared as: its shape and its entries, in row-major order."""
+"""Compared form of a formula: its shape and its entries, in row-major order."""
 
 from __future__ import annotations
 

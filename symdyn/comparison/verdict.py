@@ -1,4 +1,4 @@
-"""What a comparison found, entry by entry, as plain data that can be printed, saved and sent between processes."""
+"""Results of a comparison, entry by entry, as plain data that can be printed, saved and sent between processes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from symdyn.comparison.proofs import Evidence
 
 
 class Verdict(Enum):
-    """Of an entry, from best to worst."""
+    """Verdict on an entry, from best to worst."""
 
     EQUAL = "equal"
     CONVENTION = "equal up to a convention"
@@ -25,7 +25,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class EntryResult:
-    """Of one entry: its index, the verdict and how it was decided.
+    """Result of one entry: its index, the verdict and how it was decided.
 
     note      convention, sentence about the error, or what could not be read or decided
     point     where printed and derived differ, and `values` there
@@ -55,7 +55,8 @@ class ErratumResult:
 
 @dataclass(frozen=True)
 class FormulaResult:
-    """Of one formula: printed and derived in the slide's convention, as SymPy (of equations a pair of sides), and its entries.
+    """Result of one formula: printed and derived in the slide's convention, as SymPy (of equations a pair of sides), and its
+    entries.
 
     where   (name of a symbol, expression) put into both before they were compared
     """

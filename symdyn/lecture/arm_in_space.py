@@ -17,7 +17,7 @@ import symdyn as sd
 from symdyn.comparison.case import Formula
 from symdyn.model.symbols import symbols_of
 
-# How joint 1 is set on the base: its axis lies level.
+# Orientation of joint 1 on the base: its axis lies level.
 SEAT_1 = sp.Matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 

@@ -14,7 +14,7 @@ v, omega = sp.symbols("v omega", positive=True)
 w = sp.Matrix([0, 0, omega])
 # One line for each of the eight slides, which draw the ball at later and later times.
 OF_B, OF_E = range(1974, 2073, 14), range(1978, 2077, 14)
-BOTH = "What B and E describe is exchanged."
+BOTH = "The descriptions of B and E are exchanged."
 
 
 def _straight(path: Any) -> Any:

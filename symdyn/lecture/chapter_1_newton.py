@@ -180,5 +180,5 @@ CASES = (
     Case("translating-frame", "Newton's law in a translating frame", Slide("1.2", "Relative Motion", 183), _relative_motion),
     Case("bus-box", "A box in a bus", Slide("1.2", "Examples of a Bus", 213), _bus),
     Case("bus-strap", "A strap in an accelerating bus", Slide("1.2", "Examples of a Bus", 350), _strap),
-    Case("elevator-scale", "What a scale in an elevator shows", Slide("1.2", "Examples of an elevator", 404), _elevator),
+    Case("elevator-scale", "Reading of a scale in an elevator", Slide("1.2", "Examples of an elevator", 404), _elevator),
 )

@@ -47,14 +47,14 @@ class Turning:
 
     @property
     def relative(self) -> Convention:
-        """How the slides write R b_r_dot_P/O from here on."""
+        """Notation of the slides for R b_r_dot_P/O from here on."""
         spin = self.omega.cross(self.r)
         return Convention("relative rate", "A dot over r_P/O is the rate seen from the b-frame, in components of the n-frame.",
                           lambda derived: derived - spin)
 
     @property
     def relative_twice(self) -> Convention:
-        """How the slides write R b_r_ddot_P/O from here on."""
+        """Notation of the slides for R b_r_ddot_P/O from here on."""
         turned = self.alpha.cross(self.r) + self.omega.cross(self.omega.cross(self.r)) + 2 * self.omega.cross(self.R * self.v_b)
         return Convention("relative rate",
                           "Two dots over r_P/O are the acceleration seen from the b-frame, in components of the n-frame.",

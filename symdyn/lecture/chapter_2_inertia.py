@@ -41,7 +41,7 @@ class Turned:
 
 
 def energy() -> list[Formula]:
-    """Of two particles on a body whose point O is at rest."""
+    """Energy of two particles on a body whose point O is at rest."""
     masses, positions = [m1, m2], [r1, r2]
     w = sp.Matrix(list(omega))
     at_rest = sp.zeros(3, 1)

@@ -67,7 +67,7 @@ class Body:
 
     @cached_property
     def letters(self) -> dict[Any, Any]:
-        """What the letters of the slides stand for."""
+        """Meaning of the letters of the slides."""
         angular = stands_for(omega, self.omega) | stands_for(dot(omega), self.alpha)
         positions = stands_for(r1, self.r[0], 2) | stands_for(r2, self.r[1], 2)
         accelerations = stands_for(ddot(r1E), self.a[0]) | stands_for(ddot(r2E), self.a[1])

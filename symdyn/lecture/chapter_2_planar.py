@@ -72,7 +72,7 @@ def in_space() -> list[Formula]:
 
 
 def mass_moment_of_inertia() -> list[Formula]:
-    """Of three particles, in the plane and in space."""
+    """Mass moment of inertia of three particles, in the plane and in space."""
     masses = sp.symbols("m_1:4", positive=True)
     r = [constant(f"r_{k}G") for k in (1, 2, 3)]
     flat = point_inertia(masses, [FLAT * place for place in r])[2, 2]

@@ -1,6 +1,6 @@
 """Lecture, chapter 3.1 and the end of 3.2: two pinned bodies, and a vehicle on a straight track by Newton's law.
 
-Of x_{O/E} the slides' index E, the origin of the n-frame, is left out: x_O.
+The slides' index E of x_{O/E}, the origin of the n-frame, is left out: x_O.
 """
 
 from __future__ import annotations

@@ -45,12 +45,12 @@ class _System:
         return Matrix(formula).xreplace(dict(zip(self.r, self.map)) | dict(zip(self.rates, velocity)))
 
     def no_motion_off_the_track(self) -> proofs.Proof:
-        """Of C_r."""
+        """Proof about C_r."""
         return proofs.Proof("another formulation", "C_r J must vanish, with J of the embedding technique.",
                             lambda C_r: self.along(C_r) * self.embedded.J)
 
     def acceleration_on_the_track(self) -> proofs.Proof:
-        """Of (C_r r_dot)_r."""
+        """Proof about (C_r r_dot)_r."""
         rates = Matrix([c.dot for c in self.q])
 
         def residual(formula: Matrix) -> Matrix:

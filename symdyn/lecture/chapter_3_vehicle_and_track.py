@@ -16,7 +16,7 @@ from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
-# Of two formulas of one slide.
+# Erratum of two formulas of one slide.
 ALONE = "The vehicle alone stands where J has five rows, those of vehicle and track."
 
 

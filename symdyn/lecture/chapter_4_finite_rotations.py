@@ -80,7 +80,7 @@ def _infinitesimal() -> list[Formula]:
     turns = small_turn([0, 0, psi_]).T * small_turn([0, theta_, 0]).T * small_turn([phi_, 0, 0]).T
     rates = sp.Matrix([x.dot for x in small])
     there = dict.fromkeys(small, sp.S.Zero)
-    # Of small angles the order does not matter; R_z and R_x corrected, as the slides themselves use them at line 6361.
+    # The order of small angles does not matter; R_z and R_x corrected, as the slides themselves use them at line 6361.
     of_small = R_x(psi_) * R_y(theta_) * R_z(phi_)
     linear = sp.eye(3) + sum((of_small.diff(x).xreplace(there) * x for x in small), sp.zeros(3))
     return [

@@ -33,7 +33,7 @@ of_phi = sp.Matrix([cos(psi) * cos(theta), sin(psi) * cos(theta), -sin(theta)])
 G = sp.Matrix([[cos(psi) * cos(theta), -sin(psi), 0], [sin(psi) * cos(theta), cos(psi), 0], [-sin(theta), 0, 1]])
 
 GAMMA = conventions.reordered(columns=[2, 1, 0], sentence="The slide's gamma is (phi, theta, psi), the last angle first.")
-TOO_FAR = "What three links reach is the end effector O_4, not O_3."
+TOO_FAR = "Three links reach the end effector O_4, not O_3."
 
 
 def arm() -> tuple[sd.Frame, sd.Frame, sd.Frame, sd.Frame]:

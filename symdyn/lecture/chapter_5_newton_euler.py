@@ -111,7 +111,7 @@ def resultants() -> list[Formula]:
     a = PlanarArm()
     (M_1, F_1), (M_2, F_2) = a.force(1, "f_G"), a.force(2, "f_G")
     alpha_1, alpha_2 = a.b1.angular_acceleration(a.n), a.b2.angular_acceleration(a.n)
-    # What these two lines call omega is the angle along z, whose second derivative they take.
+    # The letter omega of these two lines is the angle along z, whose second derivative they take.
     angle_1, angle_2 = along_z(a.q1), along_z(a.q1 + a.q2)
     newton = r"\mathbf F_{{G_{0}}}", r"\mathbf M_{{G_{0}}}"
     given = sp.Matrix([a.equations.symbols.coordinates[1]])

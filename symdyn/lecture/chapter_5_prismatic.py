@@ -168,6 +168,6 @@ CASES = (
     Case("prismatic-embedding", "The same by the embedding technique, and three bodies", Slide("5.2", TITLE, 7408), embedding),
     Case("prismatic-inverse", "Inverse dynamics by recursion", Slide("5.3", TITLE, 7478), inverse),
     Case("prismatic-forward", "Forward dynamics by recursion", Slide("5.4", TITLE, 7555), forward, remarks=[Remark(
-        "What the recursion starts from is that the acceleration of the base is zero; x_0 = 0 is printed, without the two "
+        "The recursion starts from zero acceleration of the base; x_0 = 0 is printed, without the two "
         "dots. It follows from that where x_0 = 0 at all times.", 7593, (7627,))]),
 )

@@ -107,7 +107,7 @@ def at_center() -> list[Formula]:
 
 
 def force_at_joint() -> list[Formula]:
-    """What link 1 exerts on link 2 in O_2: the force."""
+    """Force of link 1 on link 2 in O_2."""
     s = link_alone()
     b2, b2_f = r"{}^{b_2}\mathbf f_{O_2}", s.f[3:, :]
     return [
@@ -120,7 +120,7 @@ def force_at_joint() -> list[Formula]:
 
 
 def moment_at_joint() -> list[Formula]:
-    """What link 1 exerts on link 2 in O_2: the moment."""
+    """Moment of link 1 on link 2 in O_2."""
     s = link_alone()
     r_2, r_3, f_2, f_3, m_2, m_3, M, F = s.n_r_2G, s.n_r_3G, s.n_f_2, s.n_f_3, s.n_m_2, s.n_m_3, s.n_M_G, s.n_F_G
     at_O2, at_b2 = s.n_m, s.f[:3, :]

@@ -78,7 +78,7 @@ def depending_on_time() -> list[Formula]:
         return sd.partial_rate(value) + value.diff(s.dot) * s.ddot
 
     twice = proofs.numeric_derivative("C must be differentiated twice.", of=C, order=2)
-    index = Erratum("What is differentiated by q is C_t + C_q q_dot; C_qt stands where C_t belongs.", twice)
+    index = Erratum("The derivative by q is that of C_t + C_q q_dot; C_qt stands where C_t belongs.", twice)
     total = C_t + velocity
     by_q = (velocity.diff(s)) * s.dot
     return [

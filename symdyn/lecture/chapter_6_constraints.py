@@ -33,7 +33,7 @@ class Pair:
 
 
 def fixed() -> list[Formula]:
-    """Of tower and platform."""
+    """Fixed joint of tower and platform."""
     arm = constant("r_OT_OP")
     pair = Pair("P", "T", lambda P, T: sd.Fixed("foot", P, T, parent_point=list(arm)))
     (rP, rT), RP = pair.r, pair.R[0]
@@ -50,7 +50,7 @@ def fixed() -> list[Formula]:
 
 
 def revolute() -> list[Formula]:
-    """Of hub and nacelle, about the x axis of the hub; C is a point of the axis."""
+    """Revolute joint of hub and nacelle, about the x axis of the hub; C is a point of the axis."""
     in_nacelle, in_hub = constant("r_C_ON"), constant("r_C_OH")
     pair = Pair("N", "H", lambda N, H: sd.Revolute("shaft", N, H, axis=[1, 0, 0], parent_point=list(in_nacelle),
                                                    child_point=list(in_hub)))

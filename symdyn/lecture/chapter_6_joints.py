@@ -203,7 +203,7 @@ def six_degrees_of_freedom() -> list[Formula]:
     carried = sp.Matrix.vstack(R * w1, R * (v1 + w1.cross(place)))
     by_frames = proofs.Proof("another formulation", "Velocity and angular velocity of the moving frame b2, carried along by b1.",
                              lambda result: (sp.Matrix(result).xreplace(known) - carried - relative).xreplace(parallel))
-    # What is wrong is shown at parallel axes of b1 and b2, where it is short.
+    # The error is shown at parallel axes of b1 and b2, where it is short.
     parallel = dict.fromkeys(links.equations.symbols.coordinates[9:], sp.S.Zero)
     v2_parallel, moved = v2.xreplace(parallel), links.moved.xreplace(parallel)
     twice = Erratum("The joint's velocity is counted twice: the identity matrix is S itself, not a further term.", by_frames)

@@ -97,7 +97,7 @@ def turbine() -> Chain:
 
 
 def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] | None = None) -> list[Formula]:
-    """Of three links; lines: of a_k, with f_k^B, f_k and tau_k two lines further each."""
+    """Inverse dynamics of three links; lines: of a_k, with f_k^B, f_k and tau_k two lines further each."""
     result = []
     for link in LINKS:
         line, also = lines[link], [(again[link] + 2 * step,) if again else () for step in range(4)]
@@ -128,7 +128,7 @@ def of_turbine() -> list[Formula]:
 
 
 def forward_dynamics() -> list[Formula]:
-    """Of the arm: articulated inertia and bias force inwards, accelerations outwards.
+    """Forward dynamics of the arm: articulated inertia and bias force inwards, accelerations outwards.
 
     The torques are those that any given accelerations need; from them the slide's formulas must find the accelerations.
     """

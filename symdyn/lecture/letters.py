@@ -47,7 +47,7 @@ def ddot(letters: sp.Matrix) -> sp.Matrix:
 
 
 def stands_for(letters: Iterable[Any], value: Iterable[Any], dots: int = 0) -> dict[Any, Any]:
-    """What to put for letters, and for their derivatives up to so many dots: for `Formula.renamed`."""
+    """Replacements of letters, and of their derivatives up to so many dots: for `Formula.renamed`."""
     names, found = list(letters), sp.Matrix(list(value))
     result: dict[Any, Any] = dict(zip(names, found, strict=True))
     for _ in range(dots):

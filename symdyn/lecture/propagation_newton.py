@@ -1,6 +1,6 @@
 """Newton's and Euler's equations of an arm in 3-vectors, by differentiating positions: no spatial vectors, no recursion.
 
-What the errata of chapters 5.7 and 5.8 are proved by.
+Proofs of the errata of chapters 5.7 and 5.8.
 """
 
 from __future__ import annotations
