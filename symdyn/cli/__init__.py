@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         except SymdynError as error:
             return complain(str(error), WRONG)
         except BrokenPipeError:
-            # The reader had enough. What Python still wants to flush at exit must go nowhere.
+            # The reader had enough. Output that Python flushes at exit must go nowhere.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return FAILED
         except OSError as error:

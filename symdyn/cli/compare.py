@@ -41,7 +41,7 @@ def compare(arguments: argparse.Namespace) -> int:
     cases = _chosen(arguments.cases)
     folder = arguments.output or (OUTPUT if arguments.all and not arguments.no_pages else None)
     if folder is not None:
-        # What the reports need is looked at before the time for comparing is spent.
+        # Packages that the reports need are checked before the time for comparing is spent.
         prepare(folder)
     errors: list[SymdynError] = []
     if files:

@@ -41,7 +41,7 @@ def demo(arguments: argparse.Namespace) -> int:
 
 
 def _loaded(module: Module) -> str:
-    """What the module runs on."""
+    """Words for what the module runs on."""
     from symdyn.runtime.building.compiler import find_compiler
 
     compiler = find_compiler() if module.backend == "c" else None

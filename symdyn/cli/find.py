@@ -1,4 +1,4 @@
-"""What a command is about: a system, its equations or its module."""
+"""Object of a command: a system, its equations or its module."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `symdyn bench` measures under words of their own: a row of a table for each."""
+"""Measurements of `symdyn bench` with words of their own: a row of a table for each."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Measurement:
     options: tuple[Option, ...] = ()
 
     def function(self) -> Callable[..., int]:
-        """What is called."""
+        """Function that is called."""
         module, _, name = self.where.partition(":")
         return getattr(importlib.import_module(module), name)  # type: ignore[no-any-return]
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Measure; a missed bound is a failure. What is not given takes the function's default."""
+        """Measure; a missed bound is a failure. Arguments that are not given take the function's defaults."""
         given = {o.parameter: getattr(arguments, o.parameter) for o in self.options}
         return FAILED if self.function()(**{name: value for name, value in given.items() if value is not None}) else 0
 

@@ -1,4 +1,4 @@
-"""What mechanism a name stands for, for commands that put one to the test: of the catalogue, with an option in parentheses or
+"""Mechanism that a name stands for, for commands that test one: of the catalogue, with an option in parentheses or
 not, of the list of `symdyn bench --all`, or of a user's file."""
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def find_mechanism(name: str, options: Mapping[str, Any]) -> System:
 
 
 def find_system_under_test(name: str, options: Mapping[str, Any], end: float | None = None) -> SystemUnderTest:
-    """What `symdyn bench` measures of it: if what makes it has an option `orientation`, in angles and in parameters.
+    """System that `symdyn bench` measures: in angles and in parameters if its maker has an option `orientation`.
 
     end   s, default: the system's duration
     Raises Stop as find_mechanism.
@@ -51,7 +51,7 @@ def find_system_under_test(name: str, options: Mapping[str, Any], end: float | N
 
 
 def title_of(name: str, options: Mapping[str, Any]) -> str:
-    """What files of a mechanism are named by."""
+    """Title by which files of a mechanism are named."""
     from symdyn.bench.work.cases import title
 
     return title(Path(name).stem if is_file(name) else name, options)

@@ -11,7 +11,7 @@ from symdyn.cli.values import pairs, value_of
 
 
 def options_of(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What was given as --option."""
+    """Options given as --option."""
     return {name: value_of(text) for name, text in pairs(arguments.option, "--option").items()}
 
 

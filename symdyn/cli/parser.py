@@ -1,4 +1,4 @@
-"""What can be written after `symdyn`."""
+"""Arguments of `symdyn`."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def stress(arguments: argparse.Namespace) -> int:
 
 
 def _print_and_save(report: StressReport, folder: Path) -> None:
-    """What comes after the rows."""
+    """Output after the rows."""
     for text in report.left_out:
         print(f"left out: {text}")
     print(report.summary())

@@ -39,7 +39,7 @@ def summarize(solution: Solution) -> None:
 
 
 def _constraints(solution: Solution) -> str:
-    """How well the constraints are kept, and what it took."""
+    """Quality of the constraints, and its cost."""
     import numpy as np
 
     off = float(np.nanmax(np.abs(solution.constraint_violation), initial=0.0))

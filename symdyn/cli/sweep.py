@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Messages of failed members that are printed; all of them are in the file.
 SHOWN = 3
-# Of more samples every so-many-th is summarized, so that memory does not grow with their number.
+# Largest number of samples that are summarized, equally spaced among more, so that memory does not grow with their number.
 SUMMARIZED = 100_000
 
 
@@ -81,7 +81,7 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _check_arguments(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> None:
-    """What contradicts itself on the command line is an error by itself; what contradicts the file is a fault of it."""
+    """A contradiction on the command line is an error by itself; one of the command line and the file is a fault of the file."""
     wrong = []
     if arguments.jobs is not None and arguments.jobs < 1:
         wrong.append(f"--jobs must be 1 or more, found {arguments.jobs}")
@@ -179,8 +179,8 @@ def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
 @contextlib.contextmanager
 def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu",
               cluster: Cluster | None = None) -> Iterator[Any]:
-    """What --jobs, --dask and the file name: a cluster; threads where code is compiled, else processes, which do not wait
-    for each other. None, the default of an ensemble, where a GPU of this machine computes."""
+    """Executor that --jobs, --dask and the file name: a cluster; threads where code is compiled, else processes, which do not
+    wait for each other. None, the default of an ensemble, where a GPU of this machine computes."""
     address = arguments.dask or (cluster.address if cluster is not None and not arguments.join else None)
     if address is not None:
         try:

@@ -203,14 +203,14 @@ def _print_prediction(plan: Plan, measured: Measured, result: Prediction, cluste
 
 
 def _print_limits(result: list[Limit], count: int) -> None:
-    print("  What breaks first with more motions:")
+    print("  First limits with more motions:")
     for limit in result[:LIMITS]:
         beyond = " (this sweep is beyond it)" if limit.motions <= count else ""
         print(f"    at {limit.motions:.2g}: {limit.what}; {limit.remedy}{beyond}")
 
 
 def _what(plan: Plan) -> str:
-    """What computes a motion."""
+    """Words for what computes a motion."""
     return "core" if plan.setting.device == "cpu" else "GPU"
 
 

@@ -1,4 +1,4 @@
-"""What a file of the user describes: a system, or cases of printed formulas. A Python file is a program, and is run; a TOML file
+"""Description by a file of the user: a system, or cases of printed formulas. A Python file is a program, and is run; a TOML file
 is data, and is read."""
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 def from_file(path: Path, options: Mapping[str, Any]) -> System:
-    """What system() of a user's file returns."""
+    """System that system() of a user's file returns."""
     return maker(path)(**options)
 
 
 def maker(path: Path) -> Callable[..., System]:
     """system() of a user's file, which is run once; what it raises, now or when it is called, is reported as the user's fault.
-    Of a data file, what it describes."""
+    Maker of the system of a file; of a data file, of what it describes."""
     if path.suffix == ".toml":
         return functools.partial(_of_data, path)
     function = _run(path, lambda module: getattr(module, "system", None))
@@ -66,7 +66,7 @@ def cases_from_file(path: Path) -> list[Case]:
 
 
 def _run(path: Path, take: Callable[[Any], Any]) -> Any:
-    """What `take` makes of the module that the file is."""
+    """Result of `take` for the module that the file is."""
     import importlib.util
 
     if not path.is_file():
@@ -83,7 +83,7 @@ def _run(path: Path, take: Callable[[Any], Any]) -> Any:
 
 @contextlib.contextmanager
 def _fault_of_the_user(path: Path) -> Iterator[None]:
-    """Whatever a user's program raises becomes a Stop, which reports it as its own."""
+    """An error that a user's program raises becomes a Stop, which reports it as its own."""
     try:
         yield
     except Stop:

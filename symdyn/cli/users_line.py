@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def users_line(path: Path, cause: BaseException | None) -> str:
-    """What to add to the message: a line with the file, the number of the line and what is there; empty where the text is not of
+    """Addition to the message: a line with the file, the number of the line and what is there; empty where the text is not of
     this file."""
     from symdyn.runtime.raised import location_of
 

@@ -70,7 +70,7 @@ def path(text: str) -> Path:
 
 
 def value_of(text: str) -> bool | int | float | str:
-    """What an option's text stands for."""
+    """Value that an option's text stands for."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     if re.fullmatch(r"[+-]?\d+", text):

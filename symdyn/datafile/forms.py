@@ -1,4 +1,4 @@
-"""What a data file can hold: for every kind of element the entries that it takes, by the arguments that make it in Python.
+"""Forms in a data file: for every kind of element the entries that it takes, by the arguments that make it in Python.
 
 One table that is written by, read by, and that the schema comes from.
 """
@@ -81,7 +81,7 @@ class Form:
         return result
 
     def value(self, element: Any, argument: str) -> Any:
-        """What an element has for an argument."""
+        """Value that an element has for an argument."""
         return self.given[argument](element) if argument in self.given else getattr(element, argument)
 
     @property
@@ -122,7 +122,7 @@ CONTACTS = [Form("Contact", contact.Contact, contact.Contact, {**_FRICTION, "sha
                  {"point_a": lambda c: c.points[0], "point_b": lambda c: c.points[1]})]
 GROUPS = [Form("ContactGroup", group.ContactGroup, group.ContactGroup, {**_FRICTION, "shape": lambda c: c.shapes})]
 BODIES = [Form("body", System.add_body, object)]
-# What stands in an entry as a table of its own, by its `type`.
+# Shapes that stand in an entry as a table of their own, by their `type`.
 SHAPES = _forms([shapes.Point, shapes.Sphere, shapes.Disc, shapes.Torus, shapes.Cylinder, shapes.Box, shapes.Plane, shapes.Bore,
                  shapes.Curve, shapes.Surface, shapes.Cam], {})
 PLAIN = {"boxes": Form("Box", elements.Box, elements.Box), "compliance": Form("Compliance", Compliance, Compliance),
@@ -131,14 +131,14 @@ ORIENTATIONS = (EulerAngles, EulerParameters)
 BEAM = tuple(f.name for f in fields(ModalBody))
 # Tables of the file -> forms of their elements; an element's `type` is left out where there is one form.
 TABLES = {"bodies": BODIES, "joints": JOINTS, "loops": LOOPS, "loads": LOADS, "contacts": CONTACTS, "contact_groups": GROUPS}
-# Of kinds of symbols, which are tables by name: what their entries may hold besides assumptions of SymPy.
+# Entries of symbols, by kind, besides assumptions of SymPy; each kind is a table by name.
 SYMBOLS = {"parameters": ("default", "unit"), "coordinates": ("initial", "unit"), "speeds": ("initial", "unit"),
            "inputs": ("initial", "unit"), "motions": ("initial", "unit")}
 ASSUMPTIONS = ("positive", "negative", "nonnegative", "nonpositive", "nonzero", "zero", "real", "integer", "finite",
                "extended_real", "complex", "commutative", "hermitian", "rational", "irrational", "algebraic", "transcendental",
                "even", "odd", "prime", "composite", "imaginary", "infinite", "antihermitian", "noninteger", "extended_positive",
                "extended_negative", "extended_nonzero", "extended_nonnegative", "extended_nonpositive")
-# What drawn shapes of pictures hold, by `kind`: lengths (rows of expressions), and what is no number.
+# Entries of drawn shapes of pictures, by `kind`: lengths (rows of expressions), and entries that are no numbers.
 DRAWN = {"box": (("size", "center", "hole"), ()), "sweep": (("points", "widths", "direction"), ()),
          "line": (("points", "end"), ("width", "to")), "water": (("level", "size", "center", "waves"), ())}
 OUTPUT_POINTS = ("position", "velocity", "acceleration", "jacobian", "bias_acceleration")

@@ -164,7 +164,7 @@ class Values:
         return known[word]
 
     def made(self, form: Form, given: Mapping[str, Any], place: Place, maker: Callable[..., Any]) -> Any:
-        """What a form makes of a table; None, with faults, where it cannot be made."""
+        """Object that a form makes of a table; None, with faults, where it cannot be made."""
         before = len(self.faults)
         arguments = self.fields(form, given, place)
         if any(entry.required and key not in arguments for key, entry in form.entries.items()):

@@ -1,4 +1,4 @@
-"""How well the accelerations are determined along a motion: condition numbers, and the places where they are worst."""
+"""Condition of the accelerations along a motion: condition numbers, and the places where they are worst."""
 
 from __future__ import annotations
 

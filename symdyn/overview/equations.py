@@ -106,7 +106,7 @@ def _quantity(equations: Equations, name: str, typeset: Callable[[str], str]) ->
 
 
 def _own(lines: Sequence[str]) -> int:
-    """How many lines stand before the quantity itself, which begins with the last line that is a matrix."""
+    """Number of lines before the quantity itself, which begins with the last line that is a matrix."""
     return max((k for k, line in enumerate(lines) if r"\begin{matrix}" in line), default=0)
 
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from symdyn.report.text import Report
 
 BUDGET = 20.0
-# What parts warn of is reported in them, so many of each.
+# Warnings of parts are reported in them, so many of each.
 WARNINGS, MOST = (SimulationWarning, EvaluationWarning, ModelWarning), 3
 STILL = ("The motion stands still, so that there is one state only to look at; set system.initial to a start from which it "
          "moves, such as {q: 0.5, q.dot: 1}.")
@@ -119,7 +119,7 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
     tested = SystemUnderTest(equations)
     makers: dict[str, tuple[str, Callable[[Part], None]]] = {
         "equations": ("Equations of motion", lambda part: _show_equations(part, equations)),
-        "generated": ("What is generated", lambda part: _show_generated(part, equations)),
+        "generated": ("Generated code", lambda part: _show_generated(part, equations)),
         "condition": ("Condition along the motion", lambda part: _show_condition(part, tested)),
         "work": ("Work against error", lambda part: _show_work(part, system, formulation, budget, log)),
         "stress": ("Stability under stress", lambda part: _show_stress(part, tested))}
@@ -154,7 +154,7 @@ def _made(title: str, make: Callable[[Part], None], log: Log) -> Part:
 
 
 def _noted(part: Part, make: Callable[[], Any], missing: Any) -> Any:
-    """What can be left out of a part, with a note."""
+    """Content that may be left out of a part, with a note."""
     try:
         return make()
     except MissingExtra as error:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 TOLERANCES = tuple(10.0**-k for k in (3, 5, 7, 9, 11, 13, 15))
 REPEATS = 3
-# What the formulation of the report is measured with, one group after the other, each at all tolerances before the next; and what
-# the other formulations are measured with.
+# Methods that the formulation of the report is measured with, one group after the other, each at all tolerances before the next;
+# and those of the other formulations.
 METHODS, OTHERS = (("dop853", "bs54", "taylor"), ("gauss", "radau")), ("dop853",)
 WITHOUT_COMPILER, OTHERS_WITHOUT = (("DOP853", "RK45"), ("Radau", "LSODA")), ("DOP853",)
 # Part of the budget that must be left for a group where the reference is not kept and is made again.
@@ -86,7 +86,7 @@ def merged(first: Benchmark, second: Benchmark) -> Benchmark:
 
 
 def shown(benchmarks: Sequence[Benchmark]) -> dict[str, Any]:
-    """What the page shows: `parts` with pictures, or tables as text where these cannot be drawn."""
+    """Content of the page: `parts` with pictures, or tables as text where these cannot be drawn."""
     from symdyn.bench.work.page import part
     from symdyn.bench.work.picture import write_pictures
 

@@ -37,7 +37,7 @@ class SympyEquations:
 
     @property
     def mass_matrix_full(self) -> sp.Matrix:
-        """Of [q'; u'], with constraints of [q'; u'; lam]: what forcing_full is the right side of."""
+        """Mass matrix of [q'; u'], with constraints of [q'; u'; lam], for the right side forcing_full."""
         n_q, n_c = len(self.q), len(self.lam)
         if not n_c:
             return sp.diag(sp.eye(n_q), self.mass_matrix)

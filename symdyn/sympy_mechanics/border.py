@@ -68,7 +68,7 @@ def from_sympy(equations: Derived, name: str = "system", defaults: Numbers | Non
 
 
 def given_matrices(equations: Derived, options: Options, kinematics: Sequence[sp.Expr] | None = None) -> GivenMatrices:
-    """What equations of SymPy's consist of. Raises ArgumentError and ModelError as from_sympy does."""
+    """Matrices of equations of SymPy's. Raises ArgumentError and ModelError as from_sympy does."""
     from sympy.physics.mechanics import KanesMethod, LagrangesMethod
 
     if isinstance(equations, (tuple, list)) and len(equations) == 4:

@@ -1,4 +1,4 @@
-"""What is said about equations of SymPy's besides the equations: name, numbers, units, extra states, outputs."""
+"""Options of equations of SymPy's besides the equations: name, numbers, units, extra states, outputs."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ class _Both:
         return result.reshape(values.shape)
 
     def claims(self) -> list[tuple[str, list[tuple[Any, Any]], int]]:
-        """What is to be the same: name, pairs, columns."""
+        """Claims of equality: name, pairs, columns."""
         eq, Y = self.equations, self.Y
         M, bias = self.in_u(eq.quantity("M_tilde")), self.in_u(eq.quantity("bias"))
         mass, force = congruence(M, Y), -(Y.T @ (M @ self.change + bias))

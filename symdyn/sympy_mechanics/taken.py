@@ -1,4 +1,4 @@
-"""Which symbol of symdyn each function of time in SymPy's equations stands for: coordinates, speeds, inputs, motions, "
+"""Symbol of symdyn that each function of time in SymPy's equations stands for: coordinates, speeds, inputs, motions, "
 "parameters."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The variables of an FMU in its description: references, units in powers of the base units, dependencies.
+"""Description of variables in an FMU: references, units in powers of the base units, dependencies.
 
 Source: Modelica Association, Functional Mock-up Interface Specification 3.0, section 2.4, and version 2.0.4, section 2.2.
 """
@@ -48,7 +48,7 @@ class FmuUnit:
 
 @dataclass(frozen=True)
 class Unknown:
-    """The reference of a variable that is computed, and those that it depends on; None: on all."""
+    """Computed variable, and the references that it depends on; None: on all."""
 
     reference: int
     depends: tuple[int, ...] | None

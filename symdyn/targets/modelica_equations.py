@@ -22,7 +22,7 @@ from symdyn.tape.walk import walk
 
 # Operations whose results are true or false: they have no variables, which would be discrete.
 _CONDITIONS = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
-# The variable that is 1 where the regular equations hold, else 0.
+# Variable that is 1 where the regular equations hold, else 0.
 REGULAR = "regular"
 _HALF = Fraction(1, 2)
 

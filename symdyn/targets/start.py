@@ -1,4 +1,4 @@
-"""The start of a mechanism in a program of its own, such as an FMU or a Modelica model."""
+"""Start of a mechanism in a program of its own, such as an FMU or a Modelica model."""
 
 from __future__ import annotations
 
