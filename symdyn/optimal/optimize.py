@@ -614,8 +614,8 @@ class _Search:
                              f"{self._worst(made, result.z)}{self._radau_instead()}", optimum)
         texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
                 for k in np.argsort(-parts)[:4] if parts[k] > MISSED]
-        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. The nearest motion violates some: {'; '.join(texts)}",
-                         optimum)
+        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. The nearest motion violates some: "
+                         f"{'; '.join(texts)}", optimum)
 
     def _fallen(self, made: Discretized, result: Found) -> str:
         """Message about a cost that goes to minus infinity; nothing where it does not."""

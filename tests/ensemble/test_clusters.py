@@ -483,7 +483,7 @@ def test_a_dry_run_for_a_thousand_million_motions_makes_none_of_them(tmp_path, c
     assert main(["sweep", path, "--dry-run", "--count", "1e9", "--workers", "64", "--output", out]) == 0
     said = capsys.readouterr().out
     for part in ("1,000,000,000 motions for 64 workers of 1 core, predicted from 10 of them", "core hours",
-                 "10000 chunks of 100,000", "breaks first", "at the most", "a worker"):
+                 "10000 chunks of 100,000", "First limits", "at the most", "a worker"):
         assert part in said, said
     assert prediction.resident() - before < 400e6  # 1e9 samples of two numbers are 16 GB
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep.toml"]

@@ -106,7 +106,7 @@ def test_all_faults_at_once(slider: Module) -> None:
 
 def test_an_infeasible_end_by_how_much(slider: Module) -> None:
     """By |F| <= 1 the slider comes 1/4 m far in 1 s, from rest to rest."""
-    text = r"cannot all be met within the bounds\. Of the nearest motion x = 1 at t = 1 s is missed by 0\.75"
+    text = r"cannot all be met within the bounds\. The nearest motion violates some: x = 1 at t = 1 s is missed by 0\.75"
     with pytest.raises(sd.NoOptimum, match=text) as error:
         sd.optimize(slider, EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)})
     kept = error.value.optimum

@@ -181,7 +181,7 @@ def test_conditions_of_small_motions() -> None:
     v = sp.Symbol("x_dot")
     slow = small(EFFORT, 2e-3, end={"x": a, "x_dot": 0}, path=[v <= sp.Float(0.6e-6)])
     assert slow["x_dot"].max() == pytest.approx(0.6e-6, rel=1e-6)
-    with pytest.raises(sd.NoOptimum, match=r"Of the nearest motion x = 1e-09 at t = 0.001 s is missed by 7.5e-10"):
+    with pytest.raises(sd.NoOptimum, match=r"The nearest motion violates some: x = 1e-09 at t = 0.001 s is missed by 7.5e-10"):
         small(EFFORT, 1e-3, end={"x": a, "x_dot": 0}, bounds={"F": (-force, force)})
 
 
