@@ -14,7 +14,7 @@ from symdyn.runtime.building.stored import write_whole
 
 
 def read(path: Path) -> Any:
-    """What a file holds; None where there is none or it is damaged."""
+    """Content of a file; None where there is none or it is damaged."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -23,7 +23,7 @@ def sources(*names: str) -> str:
 
 
 def options() -> list[str]:
-    """How the library is compiled, and where CasADi's is. Raises SymdynError for what is missing."""
+    """Options by which the library is compiled, and the place of CasADi's. Raises SymdynError for what is missing."""
     folder = package_folder("casadi")
     roots = (folder, *[p / "lib" for p in folder.parents[:4]])
     library = next((root for root in roots if (root / "libcasadi.so").exists()), None)

@@ -54,11 +54,11 @@ casadi::Function accelerations(const char *text, const SX &parameters, bool driv
     pinocchio::DataTpl<SX, 0, peers::FewJoints> data(model);
     const SX q = SX::sym("q", model.nq), u = SX::sym("u", model.nv);
     const SX tau = driven ? SX::sym("tau", model.nv) : SX::zeros(model.nv);
-    // What pinocchio::aba calls by default. Calling that would compile the algorithm in world axes, too.
+    // The function that pinocchio::aba calls by default. Calling pinocchio::aba would compile the algorithm in world axes, too.
     pinocchio::impl::abaLocalConvention(model, data, vector(q), vector(u), vector(tau));
     SX result = SX::zeros(model.nv);
     for (casadi_int i = 0; i < model.nv; i++) result(i) = data.ddq[i];
-    // What is a number is no argument.
+    // Numbers are no arguments.
     const SX none(0, 1), forces = driven ? tau : none, p = parameters.is_constant() ? none : parameters;
     return casadi::Function("accelerations", {q, u, forces, p}, {result}, {"q", "u", "tau", "p"}, {"u_dot"});
 }

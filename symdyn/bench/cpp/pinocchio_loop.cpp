@@ -1,9 +1,9 @@
 // Pinocchio's constrained dynamics in double precision, in a loop in which each evaluation waits for the one before.
 //
-// What is solved: [[M, J^T], [J, -mu]] by Pinocchio's sparse Cholesky factorization of the whole matrix (constraintDynamics).
-// J has the three rows of a point contact, because Pinocchio has no planar one. In a planar mechanism the row along z is
-// zero: mu keeps the matrix regular, and that multiplier at zero. The proximal iteration takes what mu does to the other rows
-// out again, until the residual is below the tolerance; with a mu this small the first solution is.
+// The matrix [[M, J^T], [J, -mu]] is solved with by Pinocchio's sparse Cholesky factorization of the whole (constraintDynamics).
+// J has the three rows of a point contact, because Pinocchio has no planar one. In a planar mechanism the
+// row along z is zero: mu keeps the matrix regular, and that multiplier at zero. The proximal iteration takes what mu does to the
+// other rows out again, until the residual is below the tolerance; with a mu this small the first solution is.
 
 #include <pinocchio/algorithm/constrained-dynamics.hpp>
 

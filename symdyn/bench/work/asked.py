@@ -1,4 +1,4 @@
-"""What the bench is asked for, checked: all faults at once."""
+"""Request to the bench, checked: all faults at once."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from symdyn.bench.work import against, methods
 from symdyn.bench.work.system_under_test import SystemUnderTest
 from symdyn.errors import ArgumentError, no_value
 
-# Of the usual grid, and the most to a decade.
+# Ends of the usual grid of tolerances, and the most to a decade.
 LOOSEST, TIGHTEST, DENSEST = 1e-3, 1e-15, 10
-# What no method takes tolerances above.
+# Largest tolerance that a method takes.
 LARGEST = 0.1
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is measured, checked.
+    """Request to measure, checked.
 
     formulations   None: all;  steps: s, None: none;  at: further times of interest, s
     budget         s, None: no bound
@@ -77,7 +77,7 @@ def faults_of(systems: Sequence[SystemUnderTest], formulations: Any = None, meth
 
 def checked(systems: Sequence[SystemUnderTest], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
             steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (), per_decade: Any = 1) -> Asked:
-    """What is asked for. Raises ArgumentError that lists everything that is wrong with it."""
+    """Checked request. Raises ArgumentError that lists everything that is wrong with it."""
     formulations, method_names, peers = _listed(formulations), _listed(method_names), _listed(peers)
     tolerances, steps, at = _listed(tolerances), _listed(steps), _listed(at)
     faults = [f"no {what} are named; name some, or leave them out for the usual ones" for what, values in (

@@ -34,7 +34,7 @@ _OF_BUDGET, _AT_MOST = 1 / 3, 2 / 3
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What was measured of one mechanism.
+    """Measurements of one mechanism.
 
     rows, skipped   see `record`; unfinished: empty, or why rows are missing
     reference       what errors are measured by; at: its times that are of interest besides the end, s
@@ -92,7 +92,7 @@ class Benchmark:
         return min(good, key=lambda r: r.time_at(index), default=None)
 
     def index(self, at: float) -> int:
-        """Which of the reference's times this is. Raises ArgumentError for another."""
+        """Index of this time among the reference's. Raises ArgumentError for another."""
         for k, t in enumerate(self.reference.times):
             if math.isclose(t, at, rel_tol=1e-12):
                 return k
@@ -208,7 +208,7 @@ def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None
 
 
 def finished(tested: SystemUnderTest, asked: Asked, folder: Path, command: str) -> Benchmark | None:
-    """What an earlier run of the same command left in a folder, if it was done and the motion is the same; else None."""
+    """Results that an earlier run of the same command left in a folder, if it was done and the motion is the same; else None."""
     data = resume.whole(folder / RESULTS, command)
     tested = replace(tested, at=asked.at)
     with contextlib.suppress(*DAMAGED, SymdynError):  # damaged, or nothing can be derived
@@ -263,7 +263,8 @@ def _sorted(rows: Sequence[Row], formulations: Sequence[Formulation], asked: Ask
 
 
 def _motion(tested: SystemUnderTest, first: Formulation) -> str:
-    """What rows depend on besides their own names and what errors are of: numbers, and the code that runs."""
+    """Fingerprint of the data that rows depend on besides their own names and the quantities of errors: numbers, and the code
+    that runs."""
     text = "".join(emit(first.equations, "c", ("rhs",), standalone=False).files.values())
     return resume.fingerprint(tested.name, tested.end, first.x0.tolist(), first.module.default_parameters.tolist(),
                               resume.about(), resume.code(), text)

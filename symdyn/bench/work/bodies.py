@@ -14,12 +14,12 @@ from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.symbols import coordinates, parameters, speeds
 from symdyn.model.system import System
 
-# Of the free body: principal inertia (kg m^2) and angular velocity at the start, body axes (rad/s): nearly about the axis of
+# Data of the free body: principal inertia (kg m^2) and angular velocity at the start, body axes (rad/s): nearly about the axis of
 # the middle moment, so that it flips.
 FREE_INERTIA = (1.0, 2.0, 3.0)
 FREE_OMEGA = (1e-3, 1.0, 1e-3)
-# Of Lagrange's top about its fixed point: inertia across and about its axis (kg m^2), weight times lever (N m), inclination at
-# the start (rad), spin (rad/s).
+# Data of Lagrange's top about its fixed point: inertia across and about its axis (kg m^2), weight times lever (N m), inclination
+# at the start (rad), spin (rad/s).
 TOP_INERTIA, TOP_MOMENT, TOP_TILT, TOP_SPIN = (1.0, 0.5), 3.0, math.pi / 3, 12.0
 
 

@@ -1,5 +1,5 @@
-"""What a file of results holds of the same motion: rows that a run goes on with, and rows that it carries over for a later one,
-since what was measured must not be lost where less, or something else, is asked for next."""
+"""Rows of the same motion in a file of results: those that a run goes on with, and those that it carries over for a later one,
+since measurements must not be lost where less, or something else, is requested next."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 from symdyn.bench import kept
 from symdyn.bench.work.record import Key, Row
 
-# What is no file of results.
+# Errors of a file that is no file of results.
 DAMAGED = (KeyError, TypeError, ValueError, AttributeError)
 
 
@@ -55,7 +55,7 @@ class Carried:
 
 
 def carried(path: Path | None, motion: str, mark: str) -> Carried:
-    """What a file holds of this motion; nothing where it is damaged or another's.
+    """Rows of this motion in a file; nothing where it is damaged or another's.
 
     motion   fingerprint of motion, machine and code;  mark: of what errors are of besides
     """

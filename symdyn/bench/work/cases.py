@@ -107,24 +107,24 @@ def named(name: str, options: Mapping[str, Any] | None = None) -> Case:
     wrong = wrong_option(name.partition("(")[0], case.maker(), options)
     if wrong:
         raise ArgumentError(wrong)
-    # What is known of the motion, it is known of the usual options.
+    # The known motion is that with the usual options.
     return replace(case, options={**case.options, **options}, closed=None, source="") if options else case
 
 
 def title(name: str, options: Mapping[str, Any] | None = None) -> str:
-    """What files of a mechanism with these options are named by."""
+    """Title by which files of a mechanism with these options are named."""
     return file_name("_".join((name, *(f"{key}_{value}" for key, value in (options or {}).items()))))
 
 
 def named_case(name: str, end: float | None = None, options: Mapping[str, Any] | None = None) -> SystemUnderTest:
-    """What is measured under a name; name, options and errors as of `named`."""
+    """System measured under a name; name, options and errors as of `named`."""
     case = named(name, options)
     made = from_maker(title(name, options), case.maker(), case.end if end is None else end, case.options)
     return replace(made, closed=case.closed, source=case.source)
 
 
 def taken(system: Any, end: float | None = None) -> SystemUnderTest:
-    """What is measured of a system, of equations or under a name.
+    """System measured for a system, for equations or under a name.
 
     Raises ArgumentError for anything else.
     """
@@ -141,7 +141,7 @@ def taken(system: Any, end: float | None = None) -> SystemUnderTest:
 
 def from_maker(name: str, make: Callable[..., System], end: float | None = None,
                options: Mapping[str, Any] | None = None) -> SystemUnderTest:
-    """What is measured of the systems that a function makes: if it has an option `orientation`, with Euler angles and with
+    """System measured for a function that makes it: if it has an option `orientation`, with Euler angles and with
     Euler parameters."""
     options = dict(options or {})
     takes = {p.name: p.default for p in inspect.signature(make).parameters.values()}
@@ -151,12 +151,12 @@ def from_maker(name: str, make: Callable[..., System], end: float | None = None,
 
 
 def of_system(system: System, end: float | None = None) -> SystemUnderTest:
-    """What is measured of one system."""
+    """System under test for one system."""
     return SystemUnderTest(file_name(system.name), {"": system}, float(system.duration if end is None else end))
 
 
 def of_equations(equations: Equations, end: float | None = None) -> SystemUnderTest:
-    """What is measured of equations, such as those of sd.embedding."""
+    """System under test for equations, such as those of sd.embedding."""
     return SystemUnderTest(file_name(equations.name), {}, float(equations.symbols.duration if end is None else end),
                            given=equations)
 

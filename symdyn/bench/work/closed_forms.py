@@ -14,7 +14,7 @@ import mpmath
 from symdyn.bench.work import bodies
 
 _DIGITS = 25
-# Of the catalogue's pendulum: gravity (m/s^2), length (m), angle at the start (rad), at rest.
+# Data of the catalogue's pendulum: gravity (m/s^2), length (m), angle at the start (rad), at rest.
 _PENDULUM = (9.81, 1.0, 2.0)
 
 

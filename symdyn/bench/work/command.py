@@ -102,7 +102,7 @@ def _save(result: Benchmark, place: Path, results: list[Benchmark], pictures: li
 
 
 def _fingerprint(systems: Sequence[SystemUnderTest], asked: Asked) -> str:
-    """What distinguishes commands that measure several mechanisms; empty of one."""
+    """Fingerprint that distinguishes commands that measure several mechanisms; empty for one."""
     plain = asdict(replace(asked, budget=None))
     return resume.fingerprint(sorted(one.name for one in systems), plain, resume.installed(asked.against)) if len(
         systems) > 1 else ""
@@ -117,7 +117,7 @@ def nothing(result: Benchmark) -> str:
 
 
 def _systems(names: Sequence[str], find: Callable[[str], SystemUnderTest]) -> tuple[list[SystemUnderTest], list[str]]:
-    """What is measured, and what is wrong with the names."""
+    """Systems to measure, and faults of the names."""
     result, faults = [], []
     for name in names:
         try:
@@ -128,7 +128,7 @@ def _systems(names: Sequence[str], find: Callable[[str], SystemUnderTest]) -> tu
 
 
 def _place(folder: Path, one: SystemUnderTest, systems: Sequence[SystemUnderTest]) -> Path:
-    """Of several mechanisms, and under the usual folder, each has a folder of its own."""
+    """Folder of a mechanism: of its own where there are several, and under the usual folder."""
     return folder / one.name if len(systems) > 1 or folder == FOLDER else folder
 
 

@@ -123,7 +123,7 @@ def _looks(times: np.ndarray) -> np.ndarray:
 
 
 def _energy_error(formulation: Formulation, sol: Any, given: dict[str, Any]) -> float:
-    """Of the run itself; where loads do work, of one that integrates it along."""
+    """Energy error of the run itself; where loads do work, of one that integrates it along."""
     if not sol.success:
         return NAN
     try:

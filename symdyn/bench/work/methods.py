@@ -5,12 +5,12 @@ from __future__ import annotations
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.integrating.methods import COMPILED, is_compiled
 
-# Of SciPy, on the compiled right-hand side; measured if they are named.
+# Methods of SciPy, on the compiled right-hand side; measured if they are named.
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA", "RK23")
-# Of these, what is measured unless methods are named where there is no compiler; and what is said of it.
+# Those that are measured by default where there is no compiler; and a remark on it.
 INSTEAD = ("RK45", "DOP853", "Radau", "LSODA")
 NO_COMPILER = "there is no C compiler: NumPy evaluates the right-hand side, for methods of SciPy; for compiled ones install gcc"
-# What it evaluates are orders of series, not the right-hand side, whose operations tell nothing of them.
+# It evaluates orders of series, not the right-hand side, whose number of operations does not apply.
 SERIES = "taylor"
 # Compiled methods with steps of one length, which they choose by the tolerance unless it is given.
 FIXED = ("gauss",)
@@ -24,7 +24,7 @@ def names() -> list[str]:
 
 
 def usual() -> list[str]:
-    """What is measured unless methods are named: all that are compiled, or where there is no compiler some of SciPy's."""
+    """Methods that are measured by default: all that are compiled, or where there is no compiler some of SciPy's."""
     return list(COMPILED) if find_compiler() is not None else list(INSTEAD)
 
 

@@ -31,7 +31,7 @@ def page(benchmarks: Sequence[Benchmark], pictures: Sequence[Path]) -> str:
 
 
 def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
-    """What the page says of one mechanism, as text."""
+    """Text of the page on one mechanism."""
     at = [t for t in benchmark.at if not math.isclose(t, benchmark.end)]
     indices = [benchmark.index(t) for t in at]
     peers, busy = any(row.peer for row in benchmark.rows), sum(row.disturbed for row in benchmark.rows)

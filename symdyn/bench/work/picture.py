@@ -68,7 +68,7 @@ def picture(benchmark: Benchmark) -> Any:
 
 
 def styles_of(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
-    """How each line is drawn, by its name."""
+    """Styles of lines, by their names."""
     methods = list(dict.fromkeys(r.method for r in rows if not r.peer))
     formulations = list(dict.fromkeys(r.formulation for r in rows if not r.peer))
     peers = list(dict.fromkeys(r.method for r in rows if r.peer))

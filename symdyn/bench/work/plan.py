@@ -64,7 +64,7 @@ class Walk:
         self.rows += [self.kept[job.key] for job in self.jobs if job.key in self.kept]
 
     def measure(self, store: Callable[[], None] = lambda: None) -> None:
-        """What was not measured before; store: called after every row."""
+        """Measure jobs that were not measured before; store: called after every row."""
         rows, late = self.rows, set[tuple[str, str]]()
         for job in self.jobs:
             self._step()
@@ -97,7 +97,7 @@ class Walk:
 
     @property
     def skipped(self) -> list[Skipped]:
-        """What was not measured, with the reasons."""
+        """Lines that were not measured, with the reasons."""
         slow = [Skipped(name, method, why) for (name, method, _), why in self.slow.items()]
         return [*[Skipped(*line, why) for line, why in self.given_up.items()], *slow]
 
@@ -133,7 +133,7 @@ class Walk:
 
 
 def _last(job: Job, rows: Sequence[Row]) -> float:
-    """What the row before of the same line took, with compilation, s."""
+    """Time of the row before of the same line, with compilation, s."""
     return next((r.took for r in reversed(rows) if (r.formulation, r.method) == job.key[:2] and r.took > 0), 0.0)
 
 
@@ -212,7 +212,7 @@ def spread(values: Sequence[float]) -> list[float]:
 
 
 def _looser(job: Job, rows: Sequence[Row]) -> float:
-    """How long the same method took at looser tolerances, of a job with a step with longer ones, s."""
+    """Time of the same method at looser tolerances, of a job with a step with longer ones, s."""
     name, method, tolerance, step = job.key
     return max((r.least for r in rows if (r.formulation, r.method) == (name, method) and r.least > 0 and (
         (step is None and r.step is None and (r.tolerance or 0) > (tolerance or 0)) or (

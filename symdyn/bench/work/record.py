@@ -1,4 +1,4 @@
-"""What is measured: rows of figures, and what was left out with the reason."""
+"""Record of measurements: rows of figures, and what was left out with the reason."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 NAN = math.nan
-# What distinguishes rows: formulation, method, tolerance, step.
+# Key that distinguishes rows: formulation, method, tolerance, step.
 Key = tuple[str, str, float | None, float | None]
 # A median this many times the least time shows other work on the machine.
 DISTURBED = 1.25
@@ -66,7 +66,7 @@ class Row:
 
     @property
     def key(self) -> Key:
-        """What distinguishes rows."""
+        """Key that distinguishes rows."""
         return self.formulation, self.method, self.tolerance, self.step
 
     @property
@@ -76,7 +76,7 @@ class Row:
 
     @property
     def time(self) -> float:
-        """What is compared, s: the least time, since the runs are the same, bit by bit, and other work only lengthens them."""
+        """Compared time, s: the least one, since the runs are the same, bit by bit, and other work only lengthens them."""
         return self.least
 
     @property
@@ -105,11 +105,11 @@ class Row:
         return self.error if index is None else self.errors[index] if index < len(self.errors) else NAN
 
     def time_at(self, index: int | None) -> float:
-        """What is compared of runs until one of the reference's times, s; None: the end."""
+        """Compared time of runs until one of the reference's times, s; None: the end."""
         return self._until(index)[0]
 
     def evaluations_at(self, index: int | None) -> int:
-        """Of runs until one of the reference's times; None: the end."""
+        """Evaluations of runs until one of the reference's times; None: the end."""
         return self._until(index)[1]
 
     def _until(self, index: int | None) -> tuple[float, int]:
@@ -138,7 +138,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Skipped:
-    """What was not measured, and why; an empty method stands for all of them."""
+    """Line that was not measured, and why; an empty method stands for all of them."""
 
     formulation: str
     method: str
@@ -150,7 +150,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured by: states in the coordinates of the first formulation.
+    """Reference of errors: states in the coordinates of the first formulation.
 
     kind      "closed form", "extended" or "agreement"
     times     s, increasing, the last is the end; x (n_t, n_x)

@@ -1,4 +1,4 @@
-"""What errors are measured by: a closed form, a stored or fresh run with more digits than floats have, or two runs that agree."""
+"""Reference of errors: a closed form, a stored or fresh run with more digits than floats have, or two runs that agree."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def find_reference(tested: SystemUnderTest, formulations: Sequence[Formulation],
 
 
 def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: str, until: float = math.inf) -> Reference:
-    """Of tight runs of different formulations or methods the two that agree best: the second of them, with the digits of the
+    """The two tight runs of different formulations or methods that agree best: the second of them, with the digits of the
     agreement.
 
     until   as of find_reference

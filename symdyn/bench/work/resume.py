@@ -1,4 +1,4 @@
-"""What shows that results are of the same, those of a run that was done, and whether new ones can be written."""
+"""Marks of results of the same command, results of a run that was done, and a check whether new ones can be written."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def code() -> str:
 
 
 def digest(files: Mapping[str, Path]) -> str:
-    """Of what files hold, each under a name."""
+    """Digest of the contents of files, each under a name."""
     return fingerprint(*[(name, hashlib.sha256(files[name].read_bytes()).hexdigest()) for name in sorted(files)])
 
 
@@ -61,7 +61,7 @@ def installed(names: Sequence[str]) -> list[tuple[str, bool]]:
 
 
 def whole(path: Path, command: str) -> dict[str, Any]:
-    """What a run of this very command wrote, if it was done with it; else nothing."""
+    """Results that a run of this very command wrote, if it was done with it; else nothing."""
     with contextlib.suppress(KeyError, TypeError):
         data = kept.read(path)
         if command and data["complete"] and data["command"] == command:

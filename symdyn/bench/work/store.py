@@ -46,7 +46,7 @@ def keep(formulation: Formulation, reference: Reference, text: Sequence[Sequence
 
 
 def record(formulation: Formulation, reference: Reference, text: Sequence[Sequence[str]]) -> dict[str, Any]:
-    """What is stored: the numbers it depends on, times, states, digits, how they were shown."""
+    """Record to store: the numbers it depends on, times, states, digits, how they were shown."""
     return {"how": reference.how, "digits": round(reference.digits, 1), "names": list(formulation.coordinates),
             "given": _given(formulation), "times": list(reference.times), "x": [list(row) for row in text],
             "rates": [[float(f"{v:.12g}") for v in row] for row in _rates(formulation, reference)]}

@@ -41,7 +41,7 @@ class Formulation:
 
     @cached_property
     def operations(self) -> int:
-        """Of one evaluation of the right-hand side."""
+        """Operations of one evaluation of the right-hand side."""
         return int(function_tape(self.equations, "rhs").operations)
 
     @cached_property

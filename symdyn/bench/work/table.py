@@ -58,7 +58,7 @@ def _lines(benchmark: Benchmark) -> Iterator[str]:
 
 
 def earlier(benchmark: Benchmark) -> str:
-    """Which rows were timed in an earlier run; empty if none was."""
+    """Rows that were timed in an earlier run; empty if none was."""
     kept = benchmark.earlier
     when = ", ".join(sorted({row.earlier for row in kept}))
     return (f"{len(kept)} of {len(benchmark.rows)} rows, marked ^, were timed in an earlier run, of {when}: the machine may have "

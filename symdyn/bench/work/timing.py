@@ -60,7 +60,7 @@ class Timing:
 
 
 def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:
-    """What the runs of one pass take, s, each by its own clock.
+    """Times of the runs of one pass, s, each by its own clock.
 
     repeats    asked for in all passes together;  deadline: of time.perf_counter, after which none is begun
     """

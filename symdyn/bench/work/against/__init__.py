@@ -19,12 +19,12 @@ ALL = "all"
 
 
 def names() -> list[str]:
-    """What --against takes, besides ALL for all of these."""
+    """Names that --against takes, besides ALL for all of these."""
     return list(_HOME)
 
 
 def named(asked: Iterable[str]) -> list[str]:
-    """What was asked for, with all names in the place of ALL."""
+    """Requested names, with all names in the place of ALL."""
     return list(dict.fromkeys(name for one in asked for name in (names() if one == ALL else [one])))
 
 

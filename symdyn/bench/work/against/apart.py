@@ -27,7 +27,7 @@ from symdyn.bench.work.timing import one_pass
 from symdyn.errors import SymdynError
 from symdyn.runtime.building.compiler import LINUX
 
-# What is done for the first time, such as compiling for a tolerance, may take this part of what is left, s, and at least so many.
+# A first call, which may compile for a tolerance, may take this part of the time that is left, and at least so many seconds.
 _PART, _LEAST = 1 / 4, 1.0
 # s that a process whose pipe is closed may take to end by itself, so that its code is known.
 _DYING = 5.0
@@ -103,7 +103,7 @@ class Apart:
         return self._asked("states", (-1, tolerance), tolerance, times)  # type: ignore[no-any-return]
 
     def _asked(self, name: str, key: tuple[int, float], *arguments: Any) -> Any:
-        """What the method of Here of this name gives; key: place and tolerance, for which something may be done once."""
+        """Result of the method of Here of this name; key: place and tolerance, for which something may be done once."""
         if self.gone is not None:
             raise self.gone
         rest = self.deadline - clock.perf_counter()
@@ -176,7 +176,7 @@ def _here(peer: Peer, motion: tuple[Any, ...], ends: Sequence[float]) -> Here:
 
 
 def _serve(pipe: Any, ours: Any, folder: str, peer: Peer, motion: tuple[Any, ...], ends: Sequence[float]) -> None:
-    """What the process does: prepare, then answer until nobody asks."""
+    """Work of the process: prepare, then answer until nobody asks."""
     ours.close()
     os.setpgid(0, 0)  # so that compilers end with it, and it does not end by keys that are meant for the other one
     tempfile.tempdir = folder

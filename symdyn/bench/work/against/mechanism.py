@@ -213,7 +213,7 @@ def between(t: Sequence[float] | np.ndarray, x: Sequence[np.ndarray], equations:
 
 
 def calibrated(motion: Callable[[int], tuple[float, np.ndarray]], order: int) -> Callable[[float], int]:
-    """How many fixed steps a program needs for a tolerance: found by halving steps until the end is known to 1e-3.
+    """Number of fixed steps that a program needs for a tolerance, found by halving steps until the end is known to 1e-3.
 
     motion   number of steps -> seconds, the state at the end
     The function given raises Failed for so many steps that they take longer than LONGEST.

@@ -130,7 +130,7 @@ def _bodies(tree: Tree, children: dict[int, list[int]], parent: int) -> Iterator
 
 
 def _inertia(link: Link, planar: bool) -> np.ndarray:
-    """What MuJoCo takes for it: positive, of a real body. In a plane only the entry about its normal matters."""
+    """Moments of inertia that MuJoCo takes: positive, of a real body. In a plane only the entry about its normal matters."""
     I = link.inertia
     if planar and link.turning:
         return I[2, 2] * np.eye(3) + _LEAST * np.eye(3)

@@ -1,4 +1,4 @@
-"""What another program is asked for when it runs compared with symdyn: the same motion, at its own fair best."""
+"""Interface to another program that is compared with symdyn: the same motion, at its own fair best."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BODIES = "bodies"
 
 
 class Runner(Protocol):
-    """What runs a motion with a tolerance."""
+    """Function that runs a motion with a tolerance."""
 
     def __call__(self, tolerance: float, times: np.ndarray | None = None) -> Ran:
         """Run it to the end; or, with times (n_t,), increasing, s, of which the last is the end, give the states there.
@@ -42,7 +42,7 @@ class Failed(SymdynError):
 
 @contextmanager
 def fitting(program: str) -> Iterator[None]:
-    """What goes wrong while a program is prepared is a reason why it is left out: raises Unfit."""
+    """A failure while a program is prepared is a reason why it is left out: raises Unfit."""
     try:
         yield
     except Unfit:
@@ -67,7 +67,7 @@ class Peer(Protocol):
         ...
 
     def prepare(self, equations: Any, params: np.ndarray, x0: np.ndarray, end: float, system: Any = None) -> Runner:
-        """What runs the motion; everything that is done once (derivation, compilation) is done here, outside the timing.
+        """Function that runs the motion; everything that is done once (derivation, compilation) is done here, outside the timing.
 
         equations   of one formulation, symdyn.formulation.equations.Equations; its symbols give the order of params and x
         params      (n_p,);  x0: (n_x,) consistent start [q; u; z] at t = 0;  end: s
@@ -78,5 +78,5 @@ class Peer(Protocol):
 
 
 def taken_as(peer: Peer, formulation: str) -> str:
-    """What a program is asked to run: a formulation of ours, or bodies and joints."""
+    """Model that a program runs: a formulation of ours, or bodies and joints."""
     return BODIES if peer.bodies else formulation

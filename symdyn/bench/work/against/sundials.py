@@ -27,8 +27,8 @@ INSTALL = "scikit-sundae is not installed; run: pip install 'symdyn[peers]'"
 _PARTS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode", "ida")
 MANY_STEPS = 10**6
 
-# What SUNDIALS calls: its vectors and matrices are opaque, and what opens them is given along. A positive result asks for a
-# smaller step.
+# Functions that SUNDIALS calls: its vectors and matrices are opaque, and the functions that open them are given along. A positive
+# result asks for a smaller step.
 _HEAD = """
 typedef struct {{
     {name}_frame *frame;
@@ -111,7 +111,7 @@ def installed() -> bool | str:
 
 
 def version() -> str:
-    """Of the wheel."""
+    """Version of the wheel."""
     return toolchain.version("scikit-sundae")
 
 
@@ -130,7 +130,7 @@ def _libraries() -> dict[str, Path]:
 
 
 class _Given(ctypes.Structure):
-    """What a callback is given; see _HEAD."""
+    """Arguments of a callback; see _HEAD."""
 
     _fields_ = [("frame", ctypes.c_void_p), ("entries", ctypes.c_void_p), ("columns", ctypes.c_void_p)]
 

@@ -15,7 +15,7 @@ from symdyn.tape.node import Node
 from symdyn.tape.tape import reachable
 from symdyn.tape.walk import walk as tape_walk
 
-# What other programs call as the tape does.
+# Functions with the same name in other programs and on the tape.
 ELEMENTARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
               "exp", "log", "erf")
 ARITHMETIC = {"add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg,
