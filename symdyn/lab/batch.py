@@ -37,7 +37,7 @@ ARITHMETIC = re.compile(r"\s*v(add|sub|mul|div|sqrt|fn?m)\w*")
 REPEATS = 100
 PENDULUMS = 10_000
 SINGLE = 200
-# Of each piece the best timing counts, as of each of those that are alone.
+# The best timing of each piece counts, as of each of those that are alone.
 PIECES = 50
 ROUNDS = 5
 FEW = 10

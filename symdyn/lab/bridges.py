@@ -165,7 +165,8 @@ def swinging(module: Module, bars: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _places(module: Module, bridge: Bridge) -> dict[str, list[int]]:
-    """Of each bar where x and y of its first end and its angle stand among the coordinates, and their rates among the speeds."""
+    """Indices of x and y of the first end and of the angle of each bar among the coordinates, and of their rates among the
+    speeds."""
     order = {name: k for k, name in enumerate(module.metadata.q)}
     return {bar.name: [order[f"{letter}_{bar.name}"] for letter in ("x", "y", "theta")] for bar in bridge.bars}
 
@@ -174,7 +175,7 @@ def by_hand(bridge: Bridge, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, f
     """Accelerations of x and y of the first end and of the angle of each bar, (bars, 3), for coordinates and speeds (bars, 3);
     and the condition number of the matrix that is solved with.
 
-    Of each bar the unknowns are the accelerations of its centre and of its angle, M is diagonal, and pins hold ends together:
+    The unknowns are the accelerations of each bar's centre and of its angle, M is diagonal, and pins hold ends together:
     (C M^-1 C^T) lam = C M^-1 f - d as a dense matrix, in balls of DIGITS digits, which enclose the rounding.
     """
     from flint import arb, arb_mat, ctx
@@ -189,7 +190,7 @@ def by_hand(bridge: Bridge, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, f
         weights = [[1 / m, 1 / m, 1 / inertia] for m, inertia in zip(masses, inertias, strict=True)]
 
         def end(name: str, second: bool) -> tuple[list[dict[tuple[int, int], Any]], list[Any]]:
-            """Of the acceleration of an end of a bar the factors of the unknowns, and what does not depend on them."""
+            """Factors of the unknowns in the acceleration of an end of a bar, and its part that does not depend on them."""
             k, arm = number[name], half[number[name]] * (1 if second else -1)
             return ([{(k, 0): arb(1), (k, 2): -arm * s[k]}, {(k, 1): arb(1), (k, 2): arm * c[k]}],
                     [-arm * square[k] * c[k], -arm * square[k] * s[k]])

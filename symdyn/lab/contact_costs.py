@@ -1,4 +1,4 @@
-"""What rigid contacts cost: switches of the simplest walker, and contacts that stay open.
+"""Cost of rigid contacts: switches of the simplest walker, and contacts that stay open.
 
     walker   the simplest walker (Garcia, Chatterjee, Ruina and Coleman 1998) on its long gait, 341 s down a slope of 0.009 rad at
              rtol 1e-9: processor time by 1,000 steps of the integrator
@@ -36,7 +36,7 @@ class Cost:
 
     @property
     def bound(self) -> float:
-        """What it is to be below."""
+        """Bound of the cost."""
         return BOUNDS[self.name]
 
     def __str__(self) -> str:

@@ -10,7 +10,7 @@ the largest one of the position over 31 times, by the size of the motion; work i
 of the model. MuJoCo and Exudyn have no rigid contact: where bodies touch they yield. Their ball yields so that an impact takes 5,
 20 or 80 steps, whichever gives the smallest error; friction of a joint is MuJoCo's frictionloss, in Exudyn friction over a zone
 of speeds that shrinks with the steps. A ball that slides on a plane is not built for Exudyn here. Siconos, which locates impacts
-as well, has no package that pip installs. What contacts cost besides: see symdyn.lab.contact_costs.
+as well, has no package that pip installs. The cost of contacts is measured in symdyn.lab.contact_costs.
 
     symdyn bench contacts
 """
@@ -41,7 +41,7 @@ STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 IMPACT_STEPS = (5, 20, 80)
 # Errors below which the located method is to take the least time.
 AHEAD = 1e-3
-# Of times and a setting: seconds, and positions (n_t, n).
+# Function of times and a setting: seconds, and positions (n_t, n).
 Runner = Callable[[np.ndarray, float], tuple[float, np.ndarray]]
 HEADING = f"{'motion':12}{'program':26}{'setting':>10}{'error':>12}{'ms':>10}"
 

@@ -82,7 +82,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Regret:
-    """What is lost by taking the candidates that are predicted to be the fastest.
+    """Loss by taking the candidates that are predicted to be the fastest.
 
     good    systems whose predicted fastest is within GOOD of the fastest, of `systems`
     worst   the largest loss and its system; mean: over all systems
@@ -133,7 +133,7 @@ def forming(samples: Sequence[Sample]) -> list[float]:
 
 
 def further_terms(derived: Derived) -> dict[str, float]:
-    """What simpler models add up: operations without sines and cosines, the same with each product and the sum that takes it
+    """Terms of simpler models: operations without sines and cosines, the same with each product and the sum that takes it
     counted once, divisions, longest chain."""
     counts = derived.tape.count()
     return {"operations": derived.tape.operations - counts.get("trig", 0), "instructions": derived.run.instructions,

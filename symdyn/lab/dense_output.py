@@ -329,7 +329,7 @@ def measure(number: int, method: str, rtol: float, seed: int = 0) -> Result:
 
 
 def results(numbers: Sequence[int], methods: Sequence[str], tolerances: Sequence[float], seed: int) -> Iterator[Result]:
-    """Of all problems, methods and tolerances, method by method."""
+    """Results of all problems, methods and tolerances, method by method."""
     for method in methods:
         for number in numbers:
             for rtol in tolerances:

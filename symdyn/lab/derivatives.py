@@ -5,7 +5,7 @@
     python -m symdyn.lab.derivatives --only 17                  one of them
     python -m symdyn.lab.derivatives --keep FILE --seconds 600  for ten minutes; the same line again goes on with the others
 
-Of x_dot, multipliers and inverse dynamics, the derivatives by x, inputs, parameters, time and accelerations are taken along a
+The derivatives of x_dot, multipliers and inverse dynamics by x, inputs, parameters, time and accelerations are taken along a
 random direction in each group, by module.jacobian, and compared with the central difference of the function's own tape.
 Along Euler parameters a direction keeps their norm; where constraints are redundant it stays on them. An error is that of J v
 relative to |J| |v| (Frobenius), or to the size of the function where its derivative vanishes, by the condition number of the
@@ -89,7 +89,7 @@ class Result:
 
     @property
     def worst(self) -> tuple[str, float]:
-        """Which derivative has the largest error, and the error."""
+        """Name of the derivative with the largest error, and the error."""
         return max(self.errors.items(), key=lambda one: one[1] if np.isfinite(one[1]) else np.inf, default=("nothing", 0.0))
 
     @property
@@ -208,8 +208,8 @@ def _exact(equations: Equations, tape: Any, values: dict[str, Any]) -> np.ndarra
 
 
 def condition_of(equations: Equations, values: dict[str, float]) -> float:
-    """Of the mass matrix or, with constraints, of the matrix that accelerations and multipliers are solved from, without what is
-    zero of dependent constraints."""
+    """Condition number of the mass matrix or, with constraints, of the matrix that accelerations and multipliers are solved from,
+    without zeros of dependent constraints."""
     M = evaluate(equations.tape("M_tilde"), values, 30)["M_tilde"].astype(float)
     if has_function(equations, "C_r"):
         C = evaluate(equations.tape("C_r"), values, 30)["C_r"].astype(float)
@@ -220,7 +220,7 @@ def condition_of(equations: Equations, values: dict[str, float]) -> float:
 
 
 def random_result(number: int, seed: int) -> Result:
-    """Of a random mechanism."""
+    """Result of a random mechanism."""
     m = draw(number, seed)
     name = f"{number} {' '.join(m.kinds)}"
     ud = np.random.default_rng(number).normal(size=len(m.module.metadata.u))
@@ -243,7 +243,7 @@ def off_constraints(equations: Equations, x: np.ndarray, rng: np.random.Generato
 
 
 def catalogue_result(name: str) -> Result:
-    """Of a mechanism of the catalogue, in NumPy and in part in C, near its start."""
+    """Result of a mechanism of the catalogue, in NumPy and in part in C, near its start."""
     system = get(name)
     equations = system.augmented() if name in names(constrained=True) else system.embedding()
     modules = [equations.compile(backend=b) for b in (("numpy", "c") if find_compiler() is not None else ("numpy",))]
@@ -266,7 +266,7 @@ def _measured(name: str, equations: Equations, modules: Sequence[Any], point: Po
 
 
 def results(numbers: Sequence[int], seed: int, jobs: int) -> Iterator[Result]:
-    """Of random mechanisms, in their order."""
+    """Results of random mechanisms, in their order."""
     one = partial(random_result, seed=seed)
     if jobs == 1:
         yield from map(one, numbers)
@@ -284,7 +284,7 @@ def kept(path: Path, seed: int) -> dict[int, Result]:
 
 
 def going_on(numbers: Sequence[int], seed: int, jobs: int, path: Path) -> Iterator[Result]:
-    """Of random mechanisms: those in the file first, then the others, each written into it."""
+    """Results of random mechanisms: those in the file first, then the others, each written into it."""
     known = kept(path, seed)
     yield from (known[n] for n in numbers if n in known)
     left = [n for n in numbers if n not in known]

@@ -38,7 +38,7 @@ LATER, SAME = (0.13, 0.31), 1e-5
 
 @dataclass(frozen=True)
 class Observed:
-    """What simulation shows: "stable", "neutral", "drifts", "unstable", or "not decided".
+    """Verdict by simulation: "stable", "neutral", "drifts", "unstable", or "not decided".
 
     rate    of the slowest decay or fastest growth, 1/s
     power   of time with which disturbances that neither decay nor grow exponentially grow

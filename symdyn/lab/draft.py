@@ -24,13 +24,13 @@ from symdyn.model.orientation import SEQUENCES
 from symdyn.model.symbols import Coordinate, Speed
 from symdyn.turning import in_radians
 
-# What joints and loads take as a number.
+# Number that joints and loads take.
 Expression: TypeAlias = float | sp.Expr
 # Joints that carry bodies, with how often they are drawn.
 SPATIAL = {"Revolute": 8, "Prismatic": 4, "Helical": 2, "Cylindrical": 2, "Universal": 2, "Planar": 2, "Spherical": 3, "Free": 1,
            "Fixed": 1, "Custom": 1}
 PLANAR = {"Revolute": 8, "Prismatic": 4, "Planar": 2, "Fixed": 1}
-# What closes loops, with how many freedoms it takes away, in space and in a plane.
+# Joints that close loops, with the number of freedoms that they take away, in space and in a plane.
 CLOSES_SPATIAL = {"Rod": 1, "Gear": 1, "Spherical": 3, "Planar": 3, "Universal": 4, "Cylindrical": 4, "Revolute": 5,
                   "Prismatic": 5, "Helical": 5, "Custom": 5, "Fixed": 6}
 CLOSES_PLANAR = {"Rod": 1, "Gear": 1, "Revolute": 2, "Prismatic": 2}
@@ -242,7 +242,7 @@ class Draft:
         return sum(link.freedoms for link in {*up} ^ {*other})
 
     def closures(self, inside: bool) -> list[tuple[str, Link, Link]]:
-        """What may close a loop so that the loop, and the mechanism, keep a freedom; inside: not with the ground."""
+        """Joints that may close a loop so that the loop, and the mechanism, keep a freedom; inside: not with the ground."""
         kinds = CLOSES_PLANAR if self.planar else CLOSES_SPATIAL
         links = self.moving if inside else self.links
         result = []

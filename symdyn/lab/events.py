@@ -48,7 +48,7 @@ HALVES = {"bell": (-np.sqrt(np.log(2)), np.sqrt(np.log(2))), "peak": (-1, 1), "w
 COMPILED = ("dop853", "bs54", "taylor", "radau", "radau5", "gauss")
 SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 TOLERANCES = (1e-4, 1e-8, 1e-11)
-# How near an event must be to a zero, parts of the span; what counts as exact in the closed forms.
+# Largest distance of an event from a zero, as a part of the span, with closed forms as exact.
 NEAR = 1e-6
 
 

@@ -48,7 +48,7 @@ def expression(draw: random.Random, depth: int) -> sp.Expr:
 
 
 def failure(seed: int) -> str:
-    """What is wrong with the shortest form of the random expression of this seed; "" if nothing is."""
+    """Fault of the shortest form of the random expression of this seed; "" if nothing is."""
     draw = random.Random(seed)
     given = expression(draw, draw.randint(2, 5))
     short = shortest(given)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from symdyn.errors import ArgumentError
 
-# What it is, the number, its unit, and its bound such as "< 2", "<= 1e-10" or ">= 5"; "" where there is none.
+# Title, number, unit, and bound such as "< 2", "<= 1e-10" or ">= 5"; "" where there is none.
 Figure = tuple[str, float, str, str]
 Group = Callable[[], Iterator[Figure]]
 _HOLDS = {"<": operator.lt, "<=": operator.le, ">=": operator.ge}

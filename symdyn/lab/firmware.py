@@ -40,7 +40,7 @@ class OnTarget:
 
 
 def tools() -> str:
-    """What is missing to compile for a Cortex-M and to run there, "" if nothing is."""
+    """Programs that are missing to compile for a Cortex-M and to run there, "" if nothing is."""
     return ", ".join(tool for tool in (GCC, QEMU, "arm-none-eabi-size") if shutil.which(tool) is None)
 
 

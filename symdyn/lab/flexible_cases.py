@@ -80,7 +80,7 @@ def rotor_frequencies(module: Module, speed: float) -> np.ndarray:
 
 
 def published(speed: float) -> np.ndarray:
-    """What `rotor_frequencies` should give; lag is softer than flap by the speed."""
+    """Expected result of `rotor_frequencies`; lag is softer than flap by the speed."""
     flap = FLAPPING[:, SPEEDS.index(int(speed))]
     return np.array([flap, np.sqrt(flap**2 - speed**2)])
 
@@ -89,7 +89,7 @@ def published(speed: float) -> np.ndarray:
 
 
 def rotor_and_nacelle(system: System) -> tuple[float, np.ndarray, np.ndarray]:
-    """Of a land-based turbine at q = 0, what sits on the tower: mass (kg), centre of mass from the tower's top (m), inertia about
+    """Bodies on the tower of a land-based turbine at q = 0: mass (kg), centre of mass from the tower's top (m), inertia about
     it (kg m^2), in the axes of the top."""
     model = system.check()
     numbers = dict(model.defaults)
@@ -141,12 +141,12 @@ def tower_frequencies(system: System) -> np.ndarray:
 
 
 def beam_of(system: System) -> ModalBody:
-    """Of the first flexible body."""
+    """Beam of the first flexible body."""
     return elastic_joint(system).beam
 
 
 def elastic_joint(system: System) -> Modal:
-    """Of the first flexible body; it has the elastic coordinates."""
+    """Joint of the first flexible body; it has the elastic coordinates."""
     return next(joint for joint in system.joints if isinstance(joint, Modal))
 
 
@@ -209,7 +209,7 @@ def unstiffened(beam: ModalBody) -> ModalBody:
 
 
 def deflection(system: System, times: np.ndarray, n: int = 0, rtol: float = 1e-8) -> np.ndarray:
-    """Of the tip over time, m, across the root's axis; n: of a chain of n links."""
+    """Deflection of the tip over time, m, across the root's axis; n: of a chain of n links."""
     solution = (system.recursive() if n else system.embedding()).compile().simulate(t=times, rtol=rtol, atol=1e-9)
     if n:
         return np.asarray(LENGTH / n * np.sin(np.cumsum(solution.q, axis=1)).sum(axis=1))
@@ -320,7 +320,7 @@ def accelerations(result: Equations, states: States) -> dict[str, np.ndarray]:
 
 
 def agreement(system: System, quasi: System, n: int) -> dict[str, float]:
-    """How far accelerations are from the embedded ones at n random states, relative to the largest at each: of all coordinates
+    """Differences of accelerations from the embedded ones at n random states, relative to the largest at each: of all coordinates
     that a form has in common with it. Also "constraints", the largest residual of those of absolute coordinates."""
     embedded = system.embedding()
     states = random_states(embedded, n)

@@ -23,7 +23,7 @@ START = (0.444896105, 0.463434311e-2)
 TURNING = -74.9957670
 # At the end: angle of the chord (rad), slider (m), sines (m).
 REFERENCE = {"phi2": -0.3311734988256260, "x3": 0.1697373328427860, "q1": 0.1893192899613509e-3, "q2": 0.2375751249879174e-4}
-# How fast the sines turn the clamped end away from the chord, rad/m.
+# Rate at which the sines turn the clamped end away from the chord, rad/m.
 _SLOPES = np.array([1, 2]) * np.pi / ROD
 _SIDE, _DENSITY, _MODULUS = 0.008, 7870.0, 0.2e12
 

@@ -33,7 +33,7 @@ ROWS = 400
 
 
 class Matrices(NamedTuple):
-    """Of x'_dot = A x' + B in', y' = C x' + D in'."""
+    """Matrices of x'_dot = A x' + B in', y' = C x' + D in'."""
 
     A: np.ndarray
     B: np.ndarray
@@ -43,7 +43,8 @@ class Matrices(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """Of the manifold: numbers of independent displacements and speeds among the speeds, and of the free extra states."""
+    """Coordinates of the manifold: numbers of independent displacements and speeds among the speeds, and of the free extra
+    states."""
 
     displacements: tuple[int, ...]
     speeds: tuple[int, ...]
@@ -51,7 +52,7 @@ class Coordinates:
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of these coordinates."""
         return len(self.displacements) + len(self.speeds) + len(self.states)
 
     @classmethod
@@ -85,7 +86,7 @@ class Flow:
         self._inverse = np.linalg.pinv(self._evaluate("N", x))
 
     def freedoms(self) -> tuple[int, int]:
-        """How many displacements and speeds are independent here."""
+        """Numbers of displacements and speeds that are independent here."""
         if not self.module.metadata.constraints:
             return self.n_u, self.n_u
         positions, speeds, _ = ranks(self.module, self.t, self.x, self.p)

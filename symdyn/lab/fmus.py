@@ -1,4 +1,4 @@
-"""How far FMUs of the catalogue, simulated by FMPy, agree with simulate: python -m symdyn.lab.fmus
+"""Agreement of FMUs of the catalogue, simulated by FMPy, with simulate: python -m symdyn.lab.fmus
 
 A line a mechanism: version and kind, what FMPy finds to complain of, the largest difference of the states relative to the largest
 state, the seconds to write it. FMPy's integrator for model exchange is CVODE, whose error it is then: with --integrator dop853
@@ -30,7 +30,7 @@ POINTS = 21
 
 
 def validated(path: Path) -> list[str]:
-    """What FMPy finds in an FMU; nothing where it is good."""
+    """Faults that FMPy finds in an FMU; nothing where it is good."""
     result: list[str] = importlib.import_module("fmpy.validation").validate_fmu(str(path))
     return result
 

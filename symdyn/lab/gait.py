@@ -22,7 +22,7 @@ STEP, DURATION = 0.5, 0.7
 # The step that was published with its cost, N^2 m^2 s.
 PUBLISHED: dict[str, float] = {"length": 0.4, "duration": 0.6}
 PUBLISHED_COST = 263.69884582
-# Of the stance tibia, stance femur, torso, swing femur, swing tibia: kg, kg m^2, m, and m from the knee, or the hip, to the
+# Data of the stance tibia, stance femur, torso, swing femur, swing tibia: kg, kg m^2, m, and m from the knee, or the hip, to the
 # centre.
 MASSES, INERTIAS = (3.2, 6.8, 20.0, 6.8, 3.2), (0.93, 1.08, 2.22, 1.08, 0.93)
 LENGTHS, CENTRES = (0.4, 0.4, 0.625, 0.4, 0.4), (0.128, 0.163, 0.2, 0.163, 0.128)

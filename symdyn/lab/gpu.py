@@ -122,7 +122,7 @@ def _compared(module: Module, unit: Any, name: str) -> Iterator[Figure]:
 
 
 def _rates(name: str, precision: str) -> Iterator[Figure]:
-    """What a kernel of right-hand sides takes, what bounds it, and how fast it is with states that lie on the device."""
+    """Resources of a kernel of right-hand sides, its bounds, and its rate with states that lie on the device."""
     module = sd.systems.get(name).compile(backend="c")
     unit: Any = module.library(RightSide(threads=True, looks=False, integrated=False, single=precision == "single"))
     resources = _resources(unit.source, name, "states")

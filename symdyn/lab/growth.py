@@ -1,4 +1,4 @@
-"""How derivation, generated code, compilation and run time grow with the number of bodies: O(n) recursion, O(n^3) mass matrix;
+"""Growth of derivation, generated code, compilation and run time with the number of bodies: O(n) recursion, O(n^3) mass matrix;
 and those of the derivative of x_dot by x, for which the recursion takes O(n^2) operations in O(n) code."""
 
 from __future__ import annotations

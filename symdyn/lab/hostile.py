@@ -56,7 +56,7 @@ _WORD = re.compile(r"(?<==)\s*[^\s\[\]{},]+|(?<=\")[^\"\n]*(?=\")")
 
 @dataclass(frozen=True)
 class Result:
-    """Of one case: what was called, and what is wrong with the outcome, "" if nothing is."""
+    """Result of one case: what was called, and the fault of the outcome, "" if there is none."""
 
     number: int
     call: str
@@ -200,7 +200,8 @@ def _short(result: Any) -> str:
 
 
 def not_finite(result: Any, depth: int = 4) -> str:
-    """What of a result is not finite, in words; "" if nothing is. Solutions that say that they failed are no valid results."""
+    """Parts of a result that are not finite, in words; "" if there are none. Solutions that say that they failed are no valid
+    results."""
     if getattr(result, "success", True) is False:
         return ""
     if isinstance(result, (float, np.floating)):
@@ -279,7 +280,7 @@ class Worker:
 
 
 def results(numbers: Sequence[int], seed: int, names: Sequence[str] = (), detailed: bool = False) -> Iterator[Result]:
-    """Of all cases, in their order; names: of the calls, none: all. What is written goes to a temporary folder."""
+    """Results of all cases, in their order; names: of the calls, none: all. Files are written to a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="symdyn-hostile-", ignore_cleanup_errors=True) as folder:
         worker = Worker(seed, names, detailed, folder)
         try:

@@ -498,7 +498,7 @@ URDF = """<robot name="r">
 <joint name="k" type="prismatic"><parent link="b"/><child link="c"/><mimic joint="j" multiplier="2" offset="0.1"/></joint>
 </robot>
 """
-# What stands in the place of a word or number of a file.
+# Replacements of a word or number of a file.
 FILE_WORDS = ("nan", "inf", "-inf", "1e400", "9" * 400, "-1", "0", "1e308", "1e100", "1e-320", "\"\"", "\"a\\u0000b\"",
               "\"../../x\"",
               "\"" + "q" * 300 + "\"", "[]", "{}", "[1, \"a\"]", "[[1], [2]]", "true", "2020-01-01",
@@ -529,7 +529,7 @@ def _urdf_file() -> str:
 
 
 def _urdf(text: str) -> Any:
-    """What is read, compiled to text, and evaluated."""
+    """Result of a URDF that is read, compiled to text, and evaluated."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "robot.urdf")
         path.write_bytes(text.encode("utf-8", "surrogatepass"))

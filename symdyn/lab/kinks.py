@@ -32,7 +32,7 @@ COUNT, END = 40, 20.0
 
 @dataclass(frozen=True)
 class Result:
-    """Of one run: its error in tolerances; what was raised or warned of, if anything."""
+    """Result of one run: its error in tolerances; what was raised or warned of, if anything."""
 
     kind: str
     number: int
@@ -78,7 +78,7 @@ def measure(kind: str, number: int, method: str, rtol: float, seed: int = 0) -> 
 
 
 def table(result: Sequence[Result]) -> str:
-    """Of every method and kind: how many errors are above the bound, are reported, are not; the largest error."""
+    """Table of every method and kind: how many errors are above the bound, are reported, are not; the largest error."""
     lines = [f"{'method':17}{'kind':6}{'runs':>5}{'above':>7}{'reported':>10}{'silent':>8}{'largest':>10}"]
     for method, kind in dict.fromkeys((r.method, r.kind) for r in result):
         rows = [r for r in result if (r.method, r.kind) == (method, kind)]

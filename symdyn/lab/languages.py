@@ -1,4 +1,4 @@
-"""How far files in other languages agree with the C module: compiled or interpreted here, at random states."""
+"""Agreement of files in other languages with the C module: compiled or interpreted here, at random states."""
 
 from __future__ import annotations
 

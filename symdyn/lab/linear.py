@@ -6,7 +6,7 @@
 
 Each mechanism (symdyn.lab.mechanisms) is linearized by symdyn and by differences of x_dot on the manifold (symdyn.lab.flow), in
 the same coordinates. Errors are Frobenius norms of the difference relative to that of the matrix, which counts as at least LEAST.
-What is held is a constraint of the model for the differences.
+Held coordinates and speeds are constraints of the model for the differences.
 
 Whether the linear equations are constant along a motion is decided by differences a little later. Where they are not, there must
 be no verdict; where they are so by construction (Mechanism.constant), there must be one, and it must be that of simulation
@@ -40,7 +40,7 @@ NO_VERDICT = "no verdict"
 
 @dataclass(frozen=True)
 class Result:
-    """Of one mechanism.
+    """Result of one mechanism.
 
     errors    of A, B, C_out and D; NaN if none could be computed
     uncertainty   of the differences, relative
@@ -117,7 +117,7 @@ def compare(mechanism: Mechanism, verdicts: bool = False) -> Result:
 
 
 def linearized(mechanism: Mechanism) -> Any:
-    """What symdyn gives."""
+    """Linearization by symdyn."""
     hold = {"hold": list(mechanism.hold)} if mechanism.hold else {}
     return mechanism.module.linearize(mechanism.x, mechanism.params, t=mechanism.t, inputs=mechanism.inputs, **hold)
 
@@ -181,7 +181,7 @@ def _worst(linear: Any, errors: Sequence[float], result: Matrices, expected: Mat
 
 
 def results(numbers: Sequence[int], seed: int, verdicts: bool, jobs: int) -> Iterator[Result]:
-    """Of all numbers, in their order."""
+    """Results of all numbers, in their order."""
     one = partial(measure, seed=seed, verdicts=verdicts)
     if jobs == 1:
         yield from map(one, numbers)
@@ -191,7 +191,7 @@ def results(numbers: Sequence[int], seed: int, verdicts: bool, jobs: int) -> Ite
 
 
 def table(result: Sequence[Result]) -> str:
-    """How many there are of every kind, their largest errors, and the share that is above the bound."""
+    """Table of every kind: number of results, their largest errors, and the share above the bound."""
     kinds = list(dict.fromkeys(kind for r in sorted(result, key=lambda r: r.number) for kind in r.kinds))
     lines = [f"{'kind':24}{'count':>7}" + "".join(f"{name:>10}" for name in NAMES) + f"{'above':>8}"]
     for kind in ["all", *kinds]:

@@ -25,7 +25,7 @@ Errors = tuple[float, float]
 
 @dataclass(frozen=True)
 class Reference:
-    """What a motion is compared with.
+    """Reference that a motion is compared with.
 
     kind      "published", "closed form" or "tree": a formulation without constraints
     times     s, where; errors: of a solution that has them behind the start

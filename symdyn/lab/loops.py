@@ -19,7 +19,7 @@ from symdyn.lab.extended import known
 from symdyn.lab.loop_cases import REFERENCE, Case, chosen, largest
 from symdyn.runtime.building.compiler import require_compiler
 
-# What every mechanism keeps: error of the energy balance, violations of the constraints.
+# Bounds for every mechanism: error of the energy balance, violations of the constraints.
 ENERGY, VIOLATION = 1e-9, 1e-11
 # Tolerance of the runs in which violations are looked at.
 LONG_RTOL = 1e-9
@@ -146,7 +146,7 @@ def fastest(points: Sequence[Point]) -> float:
 
 
 def distances() -> list[str]:
-    """How far the published ends are from those at more digits, one line each."""
+    """Distances of the published ends from those at more digits, one line each."""
     lines = []
     for name, row in REFERENCE.items():
         precise = known(name)

@@ -42,7 +42,7 @@ def ranks(module: Any, t: float, x: np.ndarray, p: np.ndarray, least: float = 0.
 
 
 def holonomic(module: Any) -> np.ndarray:
-    """Which rows bind displacements, (n_c,) of bool."""
+    """Mask of the rows that bind displacements, (n_c,) of bool."""
     metadata = module.metadata
     return np.array(metadata.holonomic or [True] * len(metadata.constraints), dtype=bool)
 

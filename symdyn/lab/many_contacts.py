@@ -1,6 +1,6 @@
 """Many balls in a box by time stepping: how long a second of motion takes, and by how much the laws of contact are missed.
 
-What a run recorded is looked at again, in NumPy: of every contact in every step the law of impact, the cone of friction and its
+The record of a run is checked again, in NumPy: of every contact in every step the law of impact, the cone of friction and its
 direction from velocities and impulses; gaps of all pairs and planes from the positions.
 
     symdyn bench balls

@@ -34,7 +34,7 @@ MOTIONS = ("rest", "steady", "any")
 FEATURES = ("plain", "extra states", "dependent coordinates", "Euler parameters", "quasi-velocities", "held coordinates",
             "held speeds", "acceleration outputs", "time-dependent forces", "prescribed motion", "absolute coordinates",
             "flexible body")
-# What comes by chance in addition to the feature that is dealt out, and how often.
+# Features that come by chance in addition to the one that is dealt out, with their probabilities.
 BY_CHANCE = {"extra states": 0.2, "dependent coordinates": 0.15, "Euler parameters": 0.12, "quasi-velocities": 0.12,
              "held coordinates": 0.1, "acceleration outputs": 0.3, "time-dependent forces": 0.12, "prescribed motion": 0.08}
 # Number of the mechanisms after which kinds are dealt out in other combinations.
@@ -47,7 +47,7 @@ WELL_CONDITIONED = 0.02
 HEAVY, WILD = 1e5, 2e3
 # Trims must balance to this part of the largest acceleration without them.
 BALANCED = 1e-9
-# How far away ranks of constraints are compared, m or rad.
+# Distance at which ranks of constraints are compared, m or rad.
 NEAR = 1e-2
 MOST_DRAWS = 200
 
@@ -240,7 +240,7 @@ class _Composer:
         self.root = joint
 
     def _parent(self) -> Link:
-        """What the next body hangs on; in steady motion not the ground."""
+        """Link that the next body hangs on; in steady motion not the ground."""
         draft = self.draft
         if self.motion == "steady":
             return self.rng.choice(draft.moving)

@@ -1,4 +1,4 @@
-"""How far Modelica models agree with the C module: python -m symdyn.lab.modelica
+"""Agreement of Modelica models with the C module: python -m symdyn.lab.modelica
 
 A line a mechanism: the largest and the median difference of the rates of the states at random states from those of the C module,
 relative to the largest rate, without stabilization. Models are parsed by pymoca's grammar of Modelica, and their equations are

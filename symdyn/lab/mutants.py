@@ -1,8 +1,8 @@
-"""How many corruptions of a written module its self-test finds.
+"""Share of corruptions of a written module that its self-test finds.
 
 One constant, operation, function or index of the generated functions is changed at a time, and the self-test of the changed file
-is run. What it does not find is judged by a thorough self-test with many more states: a corruption that this does not find either
-is equivalent, in the sampled region, to the file as written.
+is run. Corruptions that it does not find are judged by a thorough self-test with many more states: one that this does not find
+either is equivalent, in the sampled region, to the file as written.
 
     python -m symdyn.lab.mutants                       # 84 corruptions of each of some mechanisms, NumPy and C
     python -m symdyn.lab.mutants four_bar --backend c --count 20
@@ -60,7 +60,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Count:
-    """What became of the corruptions of one file."""
+    """Numbers of corruptions of one file by outcome."""
 
     name: str
     backend: str

@@ -83,7 +83,7 @@ def net(rows: int, columns: int) -> System:
 def by_hand(rows: int, columns: int, names: Sequence[str], q: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Accelerations of the particles, in the order of names, for coordinates and speeds in that order.
 
-    Of each rod with ends D apart, D . D_ddot = -D_dot . D_dot, and its force acts along D: the multipliers are solved for as a
+    Each rod with ends D apart has D . D_ddot = -D_dot . D_dot, and its force acts along D: the multipliers are solved for as a
     dense matrix, in balls of many digits, which enclose the rounding.
     """
     from flint import arb, arb_mat, ctx

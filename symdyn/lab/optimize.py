@@ -3,7 +3,7 @@
 CasADi gets Hermite and Simpson's separated collocation on the same mesh from the same guess, written in its scalar symbols: its
 own derivatives and virtual machine, the same IPOPT. The right-hand sides of the cart with a pole and of the biped are symdyn's
 statements; that of the linkage is one equation of its crank's angle alone, with the other angles in closed form, so that its cost
-checks the constraints, too. Of each the least processor time counts: of symdyn the whole call, with the motion simulated back, of
+checks the constraints, too. The least processor time of each counts: of symdyn the whole call, with the motion simulated back, of
 CasADi making the problem and solving it.
 """
 
@@ -25,7 +25,7 @@ from symdyn.lab.figures import Figure, print_figures
 
 # Timed calls of each.
 REPEATS = 5
-# What costs may differ by on the same mesh, and those of the linkage, whose states differ, on their meshes.
+# Largest differences of costs on the same mesh, and of those of the linkage, whose states differ, on their meshes.
 SAME, NEAR = 1e-6, 1e-5
 # Kelly, SIAM Review 59 (2017), section 5, and the cost of an independent collocation with 320 intervals, N^2 s.
 CONVERGED = 58.807667
@@ -124,7 +124,7 @@ def biped() -> Iterator[Figure]:
 
 
 class _Found:
-    """What CasADi found: cost, iterations, times of making the problem and of solving it, s."""
+    """Solution of CasADi: cost, iterations, times of making the problem and of solving it, s."""
 
     def __init__(self, cost: float, iterations: int, made: float, solved: float) -> None:
         self.cost, self.iterations, self.made, self.solved = cost, iterations, made, solved

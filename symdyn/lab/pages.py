@@ -28,7 +28,7 @@ const g = document.getElementById("c").getContext("webgl2", {{ antialias: false,
 (function f() {{ const n = ++symdyn.stage.frames; g.clearColor(n % 60 / 60, 0, 0, 1); g.clear(g.COLOR_BUFFER_BIT);
     requestAnimationFrame(f); }})();
 </script>"""
-# Of a page: the picture alone, as large as the window.
+# Style of a page with the picture alone, as large as the window.
 _ALONE = "header, #player, #plots, #note { display: none !important; }</style>"
 # Counts what the page's own drawing takes, and begins to play.
 _PLAY = """() => { const stage = symdyn.stage; stage.spent = 0; if (!stage.draw) return;

@@ -127,7 +127,8 @@ def puma() -> Iterator[Figure]:
 
 
 def stabilization() -> Iterator[Figure]:
-    """What Baumgarte's method with the gain that is chosen costs and leaves: a pendulum in x and y, 10 s, rtol = atol."""
+    """Cost of Baumgarte's method with the gain that is chosen, and the violations that it leaves: a pendulum in x and y, 10 s,
+    rtol = atol."""
     module = sd.systems.get("pendulum_absolute").augmented().compile(backend="c")
     for method, rtol in (("dop853", 1e-6), ("dop853", 1e-9), ("RK45", 1e-6), ("LSODA", 1e-6), ("LSODA", 1e-9)):
         without, kept = (module.simulate((0, 10), rtol=rtol, atol=rtol, method=method, stabilization=way)

@@ -80,7 +80,7 @@ def predicted(path: str, jobs: int) -> None:
 
 
 def taken(file: Path, jobs: int, out: Path) -> Taken:
-    """What the sweep takes. Raises SymdynError if it fails."""
+    """Cost of the sweep. Raises SymdynError if it fails."""
     begun = clock.perf_counter()
     run = subprocess.Popen([sys.executable, "-m", "symdyn", "sweep", str(file), "--no-picture", "--output", str(out), "--jobs",
                             str(jobs)], stdout=subprocess.DEVNULL)
@@ -126,7 +126,7 @@ def merged(rows: int) -> None:
 
 
 def apart(function: str, *arguments: object) -> dict[str, Any]:
-    """What a function of this file prints in a process of its own, whose memory is that of the function."""
+    """Output of a function of this file in a process of its own, whose memory is that of the function."""
     called = f"from symdyn.lab import predictions; predictions.{function}({', '.join(map(repr, arguments))})"
     run = subprocess.run([sys.executable, "-c", called], stdout=subprocess.PIPE, text=True, check=False)
     if run.returncode:

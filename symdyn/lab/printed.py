@@ -1,4 +1,4 @@
-"""What equations print against what their generated code computes, at random states.
+"""Comparison of printed equations with their generated code, at random states.
 
     python -m symdyn.lab.printed [--states N] [--simplify SECONDS] [--most OPERATIONS]
 
@@ -111,7 +111,8 @@ SYSTEMS: dict[str, Callable[[], Equations]] = {
 
 @dataclass(frozen=True)
 class Comparison:
-    """Of one quantity: symbols that the equations do not have, and the largest difference relative to the largest entry."""
+    """Comparison of one quantity: symbols that the equations do not have, and the largest difference relative to the largest
+    entry."""
 
     name: str
     strange: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What printing takes: operations of the quantities of the catalogue in every form, and processor time."""
+"""Cost of printing: operations of the quantities of the catalogue in every form, and processor time."""
 
 from __future__ import annotations
 
@@ -57,17 +57,17 @@ class Row:
 
     @property
     def bound(self) -> int | None:
-        """What the shortest form has at most."""
+        """Largest number of operations of the shortest form."""
         return FIRST_FORM.get((self.mechanism, self.quantity))
 
     @property
     def named_bound(self) -> int | None:
-        """What the form in named intermediates stays below."""
+        """Bound of the form in named intermediates."""
         return WITH_NAMES.get((self.mechanism, self.quantity))
 
     @property
     def faults(self) -> list[str]:
-        """What must not be."""
+        """Faults of the row."""
         result = ["another form is shorter"] if self.longer else []
         if self.bound is not None and (self.operations is None or self.operations > self.bound):
             result.append(f"above {self.bound}")
@@ -157,7 +157,7 @@ def run(only: Sequence[str] = (), against: str = "") -> int:
 
 
 def _slow(name: str, rows: Sequence[Row]) -> int:
-    """How many bounds on the time of M_tilde, k_tilde and F_tilde are missed; prints them."""
+    """Number of missed bounds on the time of M_tilde, k_tilde and F_tilde; prints them."""
     times = []
     if len(get(name).check().coordinates) <= COORDINATES:
         times.append(("", sum(row.seconds for row in rows), LONGER.get(name, LIMIT)))

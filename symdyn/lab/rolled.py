@@ -1,4 +1,4 @@
-"""What loops in place of repeated statements save: code, compilation and run time of mechanisms of like parts."""
+"""Savings by loops in place of repeated statements: code, compilation and run time of mechanisms of like parts."""
 
 from __future__ import annotations
 

@@ -4,8 +4,8 @@ sensitivities`.
 All figures of one group come from one run. CVODES (Hindmarsh and others, ACM TOMS 31, 2005) gets the same right-hand side:
 symdyn's own statements as compiled C, with CasADi's derivatives of them; Adams' method with functional iteration, which is the
 quickest here; and errors of the sensitivities under control, as symdyn has them. diffrax (Kidger, On Neural Differential
-Equations, thesis, Oxford 2021) gets the statements as JAX traces them, its method of order 8, and the same tolerances. Of each
-the best timing counts, without compilation.
+Equations, thesis, Oxford 2021) gets the statements as JAX traces them, its method of order 8, and the same tolerances. The best
+timing of each counts, without compilation.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def diffrax() -> Iterator[Figure]:
 
 
 def _missing() -> list[str]:
-    """What the comparison with diffrax needs and is not installed."""
+    """Packages that the comparison with diffrax needs and that are not installed."""
     return [name for name in ("jax", "diffrax") if importlib.util.find_spec(name) is None]
 
 
@@ -212,7 +212,7 @@ class _ByDiffrax:
 
 
 def memory() -> Iterator[Figure]:
-    """What the gradient of a pendulum's swing keeps, over the number of steps."""
+    """Memory of the gradient of a pendulum's swing, over the number of steps."""
     module = sd.systems.pendulum().embedding().compile(backend="c")
     result = [module.gradient(sd.Loss(end=sp.Symbol("q1")), ["l"], (0, end), [0.5], max_step=0.01) for end in (100, 400, 6400)]
     for one in result:

@@ -32,9 +32,9 @@ SIZES = (10, 100, 250, 500, 1000)
 # A cable of 1 m and 1 kg between supports 1 m apart: weight, stretched by its stiffness EA (N) under the tension T (N) of the
 # straight cable, with dampers of ETA (s) times the stiffness.
 WEIGHT, EA, TENSION, ETA = 9.81, 2.0e4, 200.0, 1e-4
-# Of shapes and frequencies: little sag, 0.3 mm, which the closed forms of frequencies suppose, N.
+# Stiffness and tension for shapes and frequencies: little sag, 0.3 mm, which the closed forms of frequencies suppose, N.
 TAUT_EA, TAUT = 1.0e7, 4.0e3
-# Of a shape with deep sag, by its rest length, which the elastic catenary describes as well, m.
+# Deep sag, m, of a shape that the elastic catenary describes by its rest length.
 DEEP = 0.2
 # The largest relative errors of sags, shapes and limits of frequencies with 1,000 links.
 BOUND = 1e-6
@@ -164,7 +164,7 @@ def measure(n: int) -> list[Row]:
 
 
 def _memory(module: Module, method: str) -> int:
-    """What a run of a compiled method takes, B; 0 for other methods."""
+    """Memory of a run of a compiled method, B; 0 for other methods."""
     if not is_compiled(method):
         return 0
     library: Any = module.library(RightSide(method=method))
@@ -174,7 +174,7 @@ def _memory(module: Module, method: str) -> int:
 
 
 def speedups(rows: Sequence[Row], method: str) -> list[float]:
-    """Of one cable: seconds of the runs of SciPy's Radau over those of a compiled method at the same error, which are
+    """Speedups for one cable: seconds of the runs of SciPy's Radau over those of a compiled method at the same error, which are
     interpolated between its runs, and those of its loosest run where this is more exact. Runs of SciPy's that are more exact than
     all of the other do not count."""
     own = sorted((row.error, row.seconds) for row in rows if row.method == method)

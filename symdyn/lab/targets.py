@@ -1,4 +1,4 @@
-"""How far functions for CasADi, JAX and PyTorch, and files in other languages, agree with the C module:
+"""Agreement of functions for CasADi, JAX and PyTorch, and of files in other languages, with the C module:
 python -m symdyn.lab.targets --library jax, or --language rust"""
 
 from __future__ import annotations

@@ -42,7 +42,8 @@ def turbine(**options: Any) -> System:
 
 
 def random_states(n: int, seed: int = 0) -> States:
-    """Of the form in Euler angles: places within 3 m, angles up to 60 degrees, any azimuth, speeds up to 1 m/s and 1 rad/s."""
+    """Random states of the form in Euler angles: positions within 3 m, angles up to 60 degrees, any azimuth, speeds up to 1 m/s
+    and 1 rad/s."""
     rng = np.random.default_rng(seed)
     q = np.column_stack([rng.uniform(-3, 3, (n, 3)), rng.uniform(-ANGLE, ANGLE, (n, 4)), rng.uniform(-np.pi, np.pi, n)])
     return States(q, rng.uniform(-1, 1, (n, 8)))
@@ -85,13 +86,13 @@ class Poses:
         self.states = states
 
     def quasi_velocities(self) -> States:
-        """Of the form in Euler parameters."""
+        """States of the form in Euler parameters."""
         q, u, *_ = self.states
         return self.states._replace(q=np.column_stack([q[:, :3], self.e[:, 0], q[:, 6:]]),
                                     u=np.column_stack([self.v_body[:, 0], self.omega_body[:, 0], u[:, 6:]]))
 
     def absolute(self, equations: Equations) -> States:
-        """Of the augmented form: the platform's own coordinates, those of the six other bodies, those of driven joints."""
+        """States of the augmented form: the platform's own coordinates, those of the six other bodies, those of driven joints."""
         (q, u, *_), bodies = self.states, range(1, self.p.shape[1])
         own = ["yaw", "azimuth"]
         driven = [own.index(c.name) for c in equations.symbols.coordinates if c.name in own]
@@ -112,7 +113,7 @@ def difference(result: np.ndarray, wanted: np.ndarray) -> float:
 
 
 def formulations(n: int, seed: int = 0, **options: Any) -> dict[str, float]:
-    """How far the accelerations of all bodies are from the embedded ones at n random states; see `difference`.
+    """Differences of the accelerations of all bodies from the embedded ones at n random states; see `difference`.
 
     Also "constraints", the largest residual of those of absolute coordinates, m.
     """
@@ -183,7 +184,7 @@ def decay_period(module: Any, rest: np.ndarray, mode: Any, size: float = 0.01) -
 
 
 def derivation() -> Iterator[Figure]:
-    """Of the embedded model in 8 coordinates, every parameter a symbol."""
+    """Derivation of the embedded model in 8 coordinates, every parameter a symbol."""
     best = np.inf
     for _ in range(3):
         begun = clock.perf_counter()
@@ -270,7 +271,7 @@ def beam_numbers() -> dict[str, float]:
 
 
 def platform_frequencies(module: Any, params: dict[str, float]) -> np.ndarray:
-    """Of the six slowest modes at rest, Hz, (6,)."""
+    """Frequencies of the six slowest modes at rest, Hz, (6,)."""
     return np.asarray(module.linearize(module.equilibrium(params=params)).modes().frequencies[:6])
 
 

@@ -98,8 +98,8 @@ SYSTEMS: tuple[Callable[[], Equations], ...] = (chain, beam, geared, closed, dam
 
 @dataclass
 class Tally:
-    """Of one system: names of identities that fail though the equations are right; how many wrong equations there were and were
-    found, by way; what was accepted, as (quantity, index, way)."""
+    """Tally of one system: names of identities that fail though the equations are right; how many wrong equations there were and
+    were found, by way; what was accepted, as (quantity, index, way)."""
 
     alarms: list[str]
     tried: Counter[str] = field(default_factory=Counter)

@@ -28,7 +28,7 @@ def counts(grouped: bool) -> tuple[int, int]:
 
 
 def misses() -> list[str]:
-    """What exceeds the published counts, in words."""
+    """Counts that exceed the published ones, in words."""
     return [f"{ours} {what} > {bound}" for ours, bound, what in zip(counts(False), PUBLISHED, ("mul", "add"), strict=True)
             if ours > bound]
 

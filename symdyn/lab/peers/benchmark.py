@@ -24,7 +24,7 @@ SEED = 20
 
 @dataclass(frozen=True)
 class Row(Timed):
-    """What was measured of one mechanism.
+    """Measurements of one mechanism.
 
     formulation       of symdyn's equations; operations, prologue, chain: of its right-hand side
     leanest           operations of the candidate with the fewest, of which the fastest was taken

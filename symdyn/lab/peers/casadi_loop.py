@@ -13,7 +13,7 @@ from symdyn.lab.peers.program import Program, State, address, unsorted
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler
 
-# What the function in a loop is called.
+# Name of the function in a loop.
 EVALUATION = "evaluation"
 _LOOP = """
 CASADI_SYMBOL_EXPORT void prepare(const double *p, double *c)

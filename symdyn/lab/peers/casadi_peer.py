@@ -30,7 +30,7 @@ class CasadiPeer:
 
     def _function(self, description: Description, runtime: bool) -> Any:
         function = self.generator.function(description.text, description.values, runtime)
-        # What CasADi offers to make code shorter is used.
+        # CasADi's common subexpressions make its code shorter.
         q, u, _, p = function.sx_in()
         return self.casadi.Function(EVALUATION, [q, u, p], [function(q, u, [], p)], {"cse": True})
 

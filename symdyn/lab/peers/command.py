@@ -1,4 +1,4 @@
-"""What `symdyn bench peers` does."""
+"""The command `symdyn bench peers`."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ CASES = {
 
 @dataclass(frozen=True)
 class Row(Timed):
-    """What was measured of one mechanism.
+    """Measurements of one mechanism.
 
     operations         of all columns one by one; executed: with 4 and 8 lanes, where lanes are used
     casadi_operations  of CasADi's Jacobian, None where it was not measured

@@ -21,7 +21,7 @@ _AXES = {(1, 0, 0): "X", (0, 1, 0): "Y", (0, 0, 1): "Z"}
 
 @dataclass(frozen=True)
 class Description:
-    """What the peers know of a mechanism.
+    """Description of a mechanism for the peers.
 
     text      gravity, joints and bodies; p0, p1, ... stand for the parameters
     values    number of each parameter

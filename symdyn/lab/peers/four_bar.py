@@ -35,7 +35,7 @@ Peer = KktPeer | KanePeer | PinocchioLoopPeer
 
 @dataclass(frozen=True)
 class LoopRow:
-    """What was measured.
+    """Measurements of a closed loop.
 
     times        program -> ns of one evaluation; operations: of those that are generated code, after hoisting
     difference   of accelerations and of multipliers, relative to their norm, the largest between programs

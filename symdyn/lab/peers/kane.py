@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 
 PARAMETERS = tuple("g m1 lc1 I1 m2 lc2 I2 m3 lc3 I3 l1 l2 l3 d".split())
-# What KanesMethod solves the velocity constraints with: the Jacobian of the dependent speeds by LU, or by Cramer's rule.
+# Solvers of the velocity constraints in KanesMethod: the Jacobian of the dependent speeds by LU, or by Cramer's rule.
 SOLVERS = ("LU", "CRAMER")
 
 

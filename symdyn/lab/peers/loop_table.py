@@ -1,4 +1,4 @@
-"""What was measured of a closed loop, as text and as JSON."""
+"""Measurements of a closed loop, as text and as JSON."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from symdyn.systems import get
 
 @dataclass(frozen=True)
 class Bound:
-    """What symdyn is held to; None: nothing.
+    """Bounds for symdyn; None: nothing.
 
     operations   at most, in one evaluation after hoisting; of derivatives those executed in 8 lanes
     ratio        at most, its time over that of CasADi's code with run-time parameters
@@ -27,7 +27,7 @@ class Bound:
     pinocchio: float | None = None
 
     def missed(self, operations: int, ratio: float | None, pinocchio: float | None, digits: int) -> list[str]:
-        """What is missed, in words, ratios to CasADi with so many digits; what was not measured, None, misses nothing."""
+        """Missed bounds, in words, ratios to CasADi with so many digits; a value that was not measured, None, misses nothing."""
         result = []
         if self.operations is not None and operations > self.operations:
             result.append(f"{operations} operations > {self.operations}")
@@ -39,7 +39,7 @@ class Bound:
 
 
 class Timed:
-    """What has times of programs, program -> ns of one evaluation."""
+    """Row with times of programs, program -> ns of one evaluation."""
 
     times: dict[str, float]
 

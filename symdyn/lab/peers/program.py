@@ -1,4 +1,4 @@
-"""What takes part: evaluations of the accelerations, or of their derivatives, at one state, in a compiled loop."""
+"""Programs that take part: evaluations of the accelerations, or of their derivatives, at one state, in a compiled loop."""
 
 from __future__ import annotations
 

@@ -20,7 +20,8 @@ from symdyn.lab.extended import known
 from symdyn.model.system import System
 from symdyn.systems import get
 
-# Of the library: what a program may be off by at low and at high precision, and what relative errors are relative to at least.
+# Bounds of the library: errors of a program at low and at high precision, and the least size that relative errors are relative
+# to.
 LOOSE, TIGHT, THRESHOLD = 1e-1, 1e-3, 1e-3
 # Runs that a reference is made of, and that must agree, where there is no closed form.
 _REFERENCE_RTOL = 1e-13
@@ -83,7 +84,7 @@ class Case:
             return float(np.sqrt(np.mean(((values - exact) / np.maximum(np.abs(exact), THRESHOLD)) ** 2)))
 
     def reference(self, first: Formulation) -> tuple[np.ndarray, str]:
-        """What is compared with, (n_t, n_y), and a sentence on how it was made."""
+        """Reference, (n_t, n_y), and a sentence on how it was made."""
         times = self.times
         if self.closed is not None:
             return self.closed(times), f"extended precision, {_precise()['digits']} digits" if self.relative else "closed form"

@@ -221,7 +221,8 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
 
 
 def _fingerprint(case: Case, peers: Sequence[str], repeats: int) -> str:
-    """What the results of a mechanism depend on: what is asked for, which programs are there, the machine, the code of ours."""
+    """Fingerprint of the data that the results of a mechanism depend on: the request, the programs that are there, the machine,
+    our code."""
     return resume.fingerprint(case.name, case.end, case.outputs, case.bounds, case.methods, list(case.systems), list(peers),
                               resume.installed(peers), repeats, resume.about(), resume.code())
 

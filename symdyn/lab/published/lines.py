@@ -72,12 +72,12 @@ class Line:
 
     @property
     def form(self) -> str:
-        """What it is asked to run."""
+        """Form that it runs."""
         return self.taken or self.formulation.name
 
     @property
     def key(self) -> tuple[str, str]:
-        """What distinguishes lines."""
+        """Key that distinguishes lines."""
         return self.program, self.formulation.name
 
     def within(self, bound: float) -> Run | None:

@@ -1,4 +1,4 @@
-"""How far what symdyn computes of a robot is from what Pinocchio does."""
+"""Agreement of symdyn's results for a robot with those of Pinocchio."""
 
 from __future__ import annotations
 

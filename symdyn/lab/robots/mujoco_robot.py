@@ -13,7 +13,7 @@ from symdyn.mjcf.compiled import Compiled, rotation
 from symdyn.mjcf.parts import Numbers, scalars_of
 from symdyn.model.record import Model, joint_speeds
 
-# Of Newton's method for states that fulfil the constraints, m or rad.
+# Tolerance, m or rad, and largest number of steps of Newton's method for states that fulfil the constraints.
 _CLOSED, _STEPS = 1e-14, 60
 # Singular values of rows below the first part of the largest are those of rows that depend on others everywhere; at states with
 # some below the second part, constraints nearly depend on each other.

@@ -17,11 +17,11 @@ from symdyn.mjcf.read import read_mjcf
 from symdyn.model.system import System
 from symdyn.urdf.values import FileFaults
 
-# What a model may differ by.
+# Largest difference of a model.
 AGREEMENT = 1e-12
 # Random states of each model.
 STATES = 5
-# How often a state is drawn that has to fulfil constraints, anywhere and then near the start, and how well it has to, m or rad.
+# Number of draws of a state that has to fulfil constraints, anywhere and then near the start, and its tolerance, m or rad.
 TRIES, CLOSED = 20, 1e-9
 
 

@@ -1,4 +1,4 @@
-"""What an example consists of."""
+"""Parts of an example."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What rolls: the Carvallo-Whipple bicycle, a disc, a rattleback, and the snakeboard."""
+"""Rolling mechanisms: the Carvallo-Whipple bicycle, a disc, a rattleback, and the snakeboard."""
 
 from __future__ import annotations
 
