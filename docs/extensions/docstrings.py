@@ -6,8 +6,8 @@ In the source a docstring is plain text: paragraphs, aligned lists of arguments,
                -1: only downwards
 
 formulas that are indented, and examples. Here lists become definitions, formulas literal blocks, and the characters that
-reStructuredText would read as markup are escaped. Of classes that symdyn makes, and users only receive, the sentence and the
-example come first, what they hold last, and their constructors are not shown.
+reStructuredText would read as markup are escaped. Classes that symdyn makes, and users only receive, have the sentence and the
+example first, their fields last, and no constructor.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def shown() -> list[str]:
 
 
 def fingerprint() -> str:
-    """Of all that the pages are made from."""
+    """Fingerprint of all that the pages are made from."""
     files = [Path(__file__).with_name("mechanisms.py"), *sorted((ROOT / "symdyn").rglob("*.py")),
              *sorted(file for file in (ROOT / "templates").rglob("*") if file.is_file())]
     return hashlib.sha256(b"\0".join([*map(str.encode, shown()), *(file.read_bytes() for file in files)])).hexdigest()

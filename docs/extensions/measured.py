@@ -23,7 +23,7 @@ from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "measured"
-# What is run, by the names of the files in which it is kept.
+# Commands to run, by the names of the files in which their output is kept.
 COMMANDS = {
     "figures": "symdyn bench figures",
     "peers": "symdyn bench peers",
@@ -64,7 +64,7 @@ def file_of(name: str) -> Path:
 
 
 def kept(name: str) -> dict[str, Any]:
-    """What a command printed, and when and where."""
+    """Output of a command, and when and where it was printed."""
     if not file_of(name).exists():
         raise ExtensionError(f"nothing is kept of {COMMANDS.get(name, name)!r}: run python docs/extensions/measured.py {name}")
     found: dict[str, Any] = json.loads(file_of(name).read_text(encoding="utf-8"))
@@ -113,7 +113,7 @@ def rows_of(result: dict[str, Any]) -> tuple[list[str], list[list[str]], list[st
 
 
 class Measured(SphinxDirective):
-    """What a command printed, as a table where it prints figures, with the command, the date and the machine; `lines`: the first
+    """Output of a command, as a table where it prints figures, with the command, the date and the machine; `lines`: the first
     ones alone."""
 
     required_arguments = 1

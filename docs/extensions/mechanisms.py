@@ -1,4 +1,4 @@
-"""What the gallery shows of mechanisms of the catalogue, made by the package itself.
+"""Gallery of mechanisms of the catalogue, made by the package itself.
 
     python docs/extensions/mechanisms.py docs/gallery generated/gallery/views NAME ...
 

@@ -1,4 +1,4 @@
-"""What the pages have outside of their folder, and the table of contents, which is read off the index page.
+"""Files of the pages outside of their folder, and the table of contents, which is read off the index page.
 
 Links to other files become files to download. The pages `contributing` and `changes` get the text of the files that they name.
 Every heading of the index page becomes a part of the site's table of contents, with the pages that are linked below it.

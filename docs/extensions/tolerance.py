@@ -23,7 +23,7 @@ METHOD = "dop853"
 WIDTH, HEIGHT, ROOM = 760, 430, (62, 16, 196, 48)
 # Decades of errors; of tolerances from the first to the last.
 LARGEST, LEAST = 1, -15
-# Of mechanisms: those of Okabe and Ito that are seen on white and on black, and a violet.
+# Colours of mechanisms: those of Okabe and Ito that are seen on white and on black, and a violet.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#8a63d2", "#cc79a7")
 
 

@@ -27,7 +27,7 @@ NOTEBOOKS, PAGES, VIEWS = ROOT / "notebooks", ROOT / "docs" / "tutorials", ROOT 
 RESULTS = NOTEBOOKS / "results"
 # Pages have an ending of their own: what stands in .md files is written by hand.
 ENDING = ".myst"
-# What HTML of a mechanism, module or motion begins with; that of other results is for notebooks, with formulas as TeX.
+# Beginning of the HTML of a mechanism, module or motion; that of other results is for notebooks, with formulas as TeX.
 TABLES = "<div><b>"
 # Colours of kept pictures, lines of text that a page shows, seconds that a cell may take.
 COLORS, LINES, LIMIT = 64, 60, 300
@@ -42,7 +42,7 @@ def sources() -> list[Path]:
 
 
 def kept(name: str) -> list[dict[str, Any]]:
-    """What the code cells of a notebook showed, in order: the digest of their code, and their outputs."""
+    """Outputs of the code cells of a notebook, in order: the digest of their code, and their outputs."""
     file = RESULTS / f"{name}.json"
     found: list[dict[str, Any]] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else []
     return found
@@ -142,7 +142,7 @@ def run(name: str) -> None:
 
 
 def shown_by(outputs: list[Any]) -> Iterator[dict[str, str]]:
-    """What a cell shows, by kinds; what it prints piece by piece is one text."""
+    """Output of a cell, by kinds; text that it prints piece by piece is one."""
     printed = ""
     for output in outputs:
         if output.output_type == "stream":

@@ -1,4 +1,4 @@
-"""How pages of the site show a page that turns and moves."""
+"""Pages of the site with a page that turns and moves."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ typedef struct {
 
 typedef struct fmu_instance {
     fmu_state s;
-    // What is computed from the present values, where it is.
+    // Results for the present values, where they are computed.
     int has_rates, has_outputs, has_derivatives;
     double rates[FMU_N_X], outputs[FMU_N_OUTPUTS + 1];
     double by_x[FMU_ROWS * FMU_N_X], by_inputs[FMU_ROWS * FMU_N_INPUTS + 1], by_p[FMU_ROWS * FMU_N_P + 1];
@@ -64,7 +64,7 @@ static int fmu_finite(const double *values, int n) {
     return 1;
 }
 
-// What follows from the present values is to be computed again.
+// Results that follow from the present values are to be computed again.
 static void fmu_changed(fmu_instance *f) { f->has_rates = f->has_outputs = f->has_derivatives = 0; }
 
 // Values at the start, as they are before anything is set.

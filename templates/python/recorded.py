@@ -97,7 +97,7 @@ class _Record:
         return lam
 
     def _near(self, terms, wanted, part):
-        """What single precision leaves where constraints nearly depend on each other may be no solution: it counts as none."""
+        """A result of single precision may be no solution where constraints nearly depend on each other: it counts as none."""
         rest, size = -wanted, self.apply("abs", wanted)
         for term in terms:
             rest, size = rest + term, size + self.apply("abs", term)
@@ -184,7 +184,7 @@ def _called(name, sizes, values):
 
 
 def _executed(traced, operations, called, given):
-    """What a function on record returns, row by row in the operations of a library, and whether it holds."""
+    """Result of a function on record, row by row in the operations of a library, and whether it holds."""
     values = list(given)
 
     def value(argument):

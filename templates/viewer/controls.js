@@ -1,4 +1,4 @@
-// What the page is made of: elements, symbols, sliders.
+// Parts of the page: elements, symbols, sliders.
 function element(parent, kind, name = "", text = "") {
     const made = document.createElement(kind);
     if (name) made.className = name;

@@ -128,7 +128,7 @@ class Renderer {
         on ? this.gl.disable(this.gl.DEPTH_TEST) : this.gl.enable(this.gl.DEPTH_TEST);
     }
 
-    // flat: 0 by normals, 1 by faces, 2 without light. What is opaque waits: equal meshes are drawn at once.
+    // flat: 0 by normals, 1 by faces, 2 without light. Opaque meshes wait: equal ones are drawn at once.
     draw(mesh, model, stretch, color, taper = 1, flat = 0, alpha = 1) {
         if (alpha < 1) this.flush();
         if (NUMBERS * (mesh.instances + 1) > mesh.numbers.length) {

@@ -31,7 +31,7 @@ const MESHES = {
     // From z = 0 to 1 with radius 1.
     rod: round(24),
     wheel: round(64),
-    // What is too thin for its ends to be seen.
+    // Thread that is too thin for its ends to be seen.
     thread: tube(6),
     ball: ball(14, 22),
     globe: ball(28, 56),

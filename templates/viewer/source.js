@@ -157,7 +157,7 @@ class Recorded extends Source {
         this.o = columnsOf(data.origins);
         this.quaternions = columnsOf(data.turns);
         this.etas = data.eta ? columnsOf(data.eta.values) : [];
-        // What acts: at points of the mechanism its vectors, else places and vectors in turn.
+        // Forces and torques: at points of the mechanism their vectors, else positions and vectors in turn.
         this.arrows = data.arrows.map(arrows => ({ ...arrows, color: colorOf(arrows.color), columns: columnsOf(arrows.values), now: [] }));
         this.seek(this.t[0]);
     }

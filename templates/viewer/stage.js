@@ -2,9 +2,9 @@
 const FIELD = 0.6;
 // Lengths of a mechanism beyond which the camera goes along with a motion.
 const FAR = 8;
-// Of the grid to each side of its middle.
+// Lines of the grid to each side of its middle.
 const LINES = 10;
-// Of a side of the water, where it has waves.
+// Facets of a side of the water, where it has waves.
 const FACETS = 48;
 const AXES = [["x", "#D55E00"], ["y", "#009E73"], ["z", "#0072B2"]];
 
@@ -339,7 +339,8 @@ class Stage {
             dark ? [0.32, 0.34, 0.38] : [0.72, 0.74, 0.77]);
     }
 
-    // What of one kind acts now, to its scale; on a dark ground in a lighter colour, as style.css has it for its check box.
+    // Arrows of one kind at the present time, to their scale; on a dark ground in a lighter colour, as style.css has it for its
+    // check box.
     drawArrows(scene, arrows, dark) {
         const { names, color: given, unit } = arrows;
         const color = dark ? given.map(c => 0.2 + 0.8 * c) : given;
@@ -414,7 +415,7 @@ class Stage {
         return [which * wide + (x + 1) / 2 * wide, (1 - y) / 2 * this.canvas.clientHeight, w];
     }
 
-    // What is nearest to the eye under a place on the canvas.
+    // Part nearest to the eye under a point of the canvas.
     pick(x, y) {
         const which = Math.min(this.scenes.length - 1, Math.floor(x / this.canvas.clientWidth * this.scenes.length));
         let best = null, depth = Infinity;

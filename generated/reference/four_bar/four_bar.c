@@ -149,7 +149,8 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     *cosine = b.value;
 }
 
-// Of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
+// Sines and cosines of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange
+// sums.
 static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
 #if defined(__FAST_MATH__)
     const double largest = -1.0;
@@ -1654,8 +1655,9 @@ typedef struct {
     int reason;
     long bad_index;
     double t_fail, x_fail[SYMDYN_NX];
-    // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
-    // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
+    // Latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
+    // and its row, else -1. All projections: the largest changes after a step, steps whose end was moved, calls of the
+    // corrections.
     double dq, du, residual, largest_dq, largest_du;
     double moved, largest_moved, t_moved;  // how far the latest end was moved, in tolerances; of all the most, and when
     int worst, of_speeds;
@@ -1699,7 +1701,7 @@ static inline double symdyn_scale(const symdyn_run *run, int i, double x_new) {
     return 1.0 / (run->atol[i] + run->rtol * size + symdyn_tiny);
 }
 
-// The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, does not count.
+// The mean square of v, 1 where it is the tolerated error of a step to x_new. Entries that are 0, without atol, do not count.
 static double symdyn_square(const symdyn_run *run, const double *v, const double *x_new) {
     double sum = 0.0;
     for (int i = 0; i < SYMDYN_NX; i++) {
@@ -1939,7 +1941,7 @@ static void symdyn_propose(symdyn_run *run) {
     run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
-// What becomes of a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
+// Accept or reject a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
 static void symdyn_judge(symdyn_run *run, int failure, double err, double root, const double *x_new, const double *xd_new) {
     const double h = fabs(run->h_try);
     double grow;
@@ -2029,7 +2031,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     }
 }
 
-// What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
+// Report of the run; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
     const symdyn_run *const run = (const symdyn_run *)memory;
     const symdyn_report now = {

@@ -108,7 +108,7 @@ int four_bar_lam(const double *q, const double *u, const double *p, const double
 // force and moment of every joint on its child, at the joint's point on it, n-frame; out: 4 x 6, row by row
 int four_bar_reactions(const double *q, const double *u, const double *p, const double *c, double *out);
 
-// What a return code of the functions means; 0: no fault, -1: not finite.
+// Meaning of a return code of the functions; 0: no fault, -1: not finite.
 const char *four_bar_reason(int code);
 
 // One call for many states: rows of t, of x = [q; u; z] (6), of ud (3), of inputs (0); strides are in rows, 0 repeats

@@ -313,7 +313,8 @@ class _ManyStates:
 
     @staticmethod
     def singular_fallback(error, regular, singular, arguments):
-        """What `regular` gives at the states where it does not fail, and `singular` at the others; error: of `regular` at all."""
+        """Results of `regular` at the states where it does not fail, and of `singular` at the others; error: of `regular` at
+        all."""
         t, *groups = arguments
         shape = np.broadcast_shapes(np.shape(t), *[np.shape(value) for group in groups for value in group])
         holds = np.array(np.broadcast_to(np.logical_not(error.states), shape))

@@ -79,7 +79,7 @@ int pendulum_energy(const double *q, const double *u, const double *p, const dou
 // tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud; out: 1 numbers
 int pendulum_inverse_dynamics(const double *q, const double *ud, const double *p, const double *c, double *out);
 
-// What a return code of the functions means; 0: no fault, -1: not finite.
+// Meaning of a return code of the functions; 0: no fault, -1: not finite.
 const char *pendulum_reason(int code);
 
 // One call for many states: rows of t, of x = [q; u; z] (2), of ud (1), of inputs (0); strides are in rows, 0 repeats

@@ -10,9 +10,9 @@
 // The entry of row i and column j, where columns begin at a.
 #define SYMDYN_BAND_AT(lower, upper, i, j) ((j) * SYMDYN_BAND_HEIGHT(lower, upper) + (lower) + (upper) + (i) - (j))
 
-// Factorize A + i B, or A where B is 0. Of the rows that may come next the one is taken whose entry is the largest part of the
-// row's scale, one over its largest entry: units are not compared with each other; n + lower numbers, which are used up, zeros at
-// the end. Inverses on the diagonal. Returns 1 if the matrix is singular.
+// Factorize A + i B, or A where B is 0. The next row is the one whose entry is the largest part of the row's scale, one over its
+// largest entry: units are not compared with each other; n + lower numbers, which are used up, zeros at the end. Inverses on the
+// diagonal. Returns 1 if the matrix is singular.
 static inline __attribute__((always_inline)) int symdyn_band_eliminate(
     int n, int lower, int upper, double *restrict A, double *restrict B, double *restrict scale, int *restrict order) {
     const int row = SYMDYN_BAND_HEIGHT(lower, upper) - 1;  // from an entry to the next one in its row

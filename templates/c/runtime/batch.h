@@ -10,7 +10,7 @@ enum { SYMDYN_NUMBERS = SYMDYN_NP + SYMDYN_NC + SYMDYN_NIN + !(SYMDYN_NP + SYMDY
 SYMDYN_EXPORT int SYMDYN_NAME(batch_width)(void);
 SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, double *out, const long *out_steps, int *codes);
 
-// How many lanes there are; 1: the compiler has no vectors.
+// Number of lanes; 1: the compiler has no vectors.
 SYMDYN_EXPORT int SYMDYN_NAME(batch_width)(void) { return SYMDYN_WIDTH; }
 
 // Parameters and inputs of a trajectory into a lane; of the last one for lanes that are left over. given: inputs, p. Returns what

@@ -288,7 +288,7 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_inputs)(void *memory, const symdyn_problem 
 #endif
 
 #if SYMDYN_EVENTS
-// Which events to look for, by samples no further apart than spacing, s (0: any); as if they were taken after so many attempted
+// Events to look for, by samples no further apart than spacing, s (0: any); as if they were taken after so many attempted
 // steps; doubts: of every trajectory, zeros. All have to stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double spacing, long taken_after, int *doubts) {
     symdyn_batch *const batch = (symdyn_batch *)memory;

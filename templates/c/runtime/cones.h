@@ -3,7 +3,7 @@
 //
 // Relative velocities are w = free + J du, du = M^-1 J^T P, row by row: the first row of a contact is along its normal, one or
 // two more along its tangents. Wanted is P with P_n >= 0, w_n >= 0, P_n w_n = 0, and |P_t| <= mu P_n, P_t = -mu P_n w_t/|w_t|
-// where w_t is not zero. That is the root of P_n - max(0, P_n - w_n/d_n) and of P_t - (P_t - w_t/d_t projected onto the disc of
+// where w_t is not zero. This P is the root of P_n - max(0, P_n - w_n/d_n) and of P_t - (P_t - w_t/d_t projected onto the disc of
 // radius mu P_n). Dry friction of a joint has no normal row: the radius of its disc is given.
 //
 // Source: Alart and Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods, 1991;
@@ -37,7 +37,7 @@ static void symdyn_cones_push(const symdyn_cones *c, long i, const double *impul
     }
 }
 
-// How many of a contact's rows, which come first, are along its normal: one, or none.
+// Number of a contact's rows along its normal, which come first: one, or none.
 static long symdyn_cones_lead(const symdyn_cones *c, long i) { return c->bounded[i] ? 0 : 1; }
 
 // The radius of the disc that a contact's tangential impulses are in.
@@ -118,7 +118,8 @@ static double symdyn_cones_sweep(symdyn_cones *c) {
     return worst;
 }
 
-// What a contact's impulses are projected from: normal and tangents, and the radius of the disc. Returns the tangents' size.
+// Point that a contact's impulses are projected from: normal and tangents, and the radius of the disc. Returns the tangents'
+// size.
 static double symdyn_cones_trial(const symdyn_cones *c, long i, double *z, double *radius) {
     const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
     double square = 0.0;
@@ -142,7 +143,7 @@ static void symdyn_cones_velocities(symdyn_cones *c) {
     }
 }
 
-// What each contact does, and how far all are from the laws by P and w, m/s.
+// Note the mode of each contact; returns how far all are from the laws by P and w, m/s.
 static double symdyn_cones_missed(symdyn_cones *c) {
     double worst = 0.0;
     for (long i = 0; i < c->n; i++) {
@@ -182,7 +183,7 @@ static void symdyn_cones_slip_rows(const symdyn_cones *c, long i, long row, long
     }
 }
 
-// How many rows the contacts that are not open have.
+// Number of rows of the contacts that are not open.
 static long symdyn_cones_closed(const symdyn_cones *c) {
     long n = 0;
     for (long i = 0; i < c->n; i++)
@@ -378,7 +379,8 @@ static void symdyn_cones_sweeps(symdyn_cones *c, double tolerance, long most) {
     }
 }
 
-// How far impulses may go along their latest change until the first contact that has part in it opens or reaches its cone.
+// Share of their latest change by which impulses may go on until the first contact that has part in it opens or reaches its
+// cone.
 static double symdyn_cones_reach(const symdyn_cones *c) {
     double most = 1e300, largest = 0.0;
     for (long r = 0; r < c->first[c->n]; r++) largest = fmax(largest, fabs(c->change[r]));

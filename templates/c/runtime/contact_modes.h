@@ -1,4 +1,4 @@
-// Which contacts open, stick or slide at one instant, in a plane: all combinations of modes that fulfil the laws of contact and
+// Contacts that open, stick or slide at one instant, in a plane: all combinations of modes that fulfil the laws of contact and
 // friction, as symdyn/runtime/contact_laws.py finds them, where the rows that hold do not depend on each other.
 //
 // Velocities of an impact, or accelerations, are w = b + D lam, with lam_N >= 0, w_N >= 0 and lam_N w_N = 0 in every contact, and

@@ -32,9 +32,9 @@ static int symdyn_event_noise(symdyn_run *run, double t, const double *x, double
 }
 
 // At the start of the run and after a reset, before it: note on which side of zero every quantity is, or, at zero, which it goes
-// to within a small step (0: that is not known yet). What has just vanished counts as zero, whatever rounding has left of it,
-// unless its reset has moved it from there. Zero counts where a quantity goes on in the direction of its event, of what has just
-// vanished only where its reset has stopped it; before: the changes of that within the same step before the reset.
+// to within a small step (0: that is not known yet). A quantity that has just vanished counts as zero, whatever rounding has left
+// of it, unless its reset has moved it from there. Zero counts where a quantity goes on in the direction of its event, of what
+// has just vanished only where its reset has stopped it; before: the changes of that within the same step before the reset.
 static int symdyn_event_sides(symdyn_run *run, double t, const double *x, const double *xd, double step, const double *before) {
     double *const now = run->events.now, then[SYMDYN_N_EVENTS], y[SYMDYN_NX], noise[SYMDYN_N_EVENTS];
     int failure;
@@ -130,7 +130,7 @@ static int symdyn_event_rounding(symdyn_run *run, double t, const double *x, dou
 }
 
 // The first quantity that may have zeros on a panel which the signs at its ends do not show, -1 if there is none: see
-// symdyn/panels.py. What is no larger than its rounding is not resolved any further.
+// symdyn/panels.py. A quantity no larger than its rounding is not resolved any further.
 static int symdyn_event_undecided(symdyn_run *run, double right, double (*v)[SYMDYN_N_EVENTS], const double *x) {
     double noise[SYMDYN_N_EVENTS];
     int known = 0;
@@ -793,7 +793,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
             run->status = first == run->t_end ? SYMDYN_DONE : SYMDYN_STEP_LIMIT;
             if (cut || run->events.at_once >= 5) run->status = cut ? SYMDYN_STOPPED : SYMDYN_EVENT_AT_ONCE;
             if (cut || !resets) return;
-            // What the quantities change by in a small step before.
+            // Changes of the quantities in a small step before.
             const double earlier = first - run->direction * fmin(1e-6 * fabs(run->h_old), fabs(first - run->t_old));
             failure = symdyn_state_at(run, earlier, xd) || symdyn_event_values(run, earlier, xd, run->events.now);
             for (int k = 0; k < SYMDYN_N_EVENTS; k++)
@@ -805,7 +805,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         if (first == right) n--;
     }
     if (!failure) return;
-    // What is trusted: up to there the quantities were known.
+    // The motion is trusted up to where the quantities were known.
     if (left == run->t_old || symdyn_state_at(run, left, x)) {
         left = run->t_old;
         run->unstored = 0;
@@ -848,7 +848,7 @@ static int symdyn_resume(symdyn_run *run) {
     return failure || pending;
 }
 
-// Which of the SYMDYN_N_EVENTS events to look for, after the start, by samples no further apart than spacing, s (0: any).
+// Mask of the SYMDYN_N_EVENTS events to look for, after the start, by samples no further apart than spacing, s (0: any).
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing) {
     symdyn_run *const run = (symdyn_run *)memory;
     run->events.spacing = spacing;

@@ -26,8 +26,8 @@ typedef struct {
     int entangled;  // columns depended on the order of events at one time
 #endif
 #if SYMDYN_SENSITIVE && SYMDYN_KEEPS_RESETS
-    // What the constraints made of the latest reset: jumps of the speeds, impulses along entries that are held; whether the
-    // coordinates that were wanted were off the constraints; which entries were asked for.
+    // Result of the latest reset under the constraints: jumps of the speeds, impulses along entries that are held; whether the
+    // coordinates that were wanted were off the constraints; the requested entries.
     double made[SYMDYN_NU + SYMDYN_HELD];
     int off_constraints, asked[SYMDYN_HELD];
 #endif

@@ -6,7 +6,7 @@
 #if SYMDYN_CROSSES
 // Whether to try another step for one whose error a shorter one would not fix, maybe: where a singular configuration lies in the
 // step, what its stages add across the constraints is projected away, and rounding grows with the inverse cube of a stage's
-// distance from it. Of several the one whose stages keep away best is taken, by the error before it and after, as err becomes.
+// distance from it. The best of several is the one whose stages keep away most, by the error before it and after, as err becomes.
 static int symdyn_cross(symdyn_run *run, const double *x_new, double *err) {
     enum { ESTIMATES = 1 + SYMDYN_SECOND_ERROR };
     const double raw = *err, h = run->h_try;

@@ -126,7 +126,7 @@ static int symdyn_ahead(symdyn_run *run) {
     return SYMDYN_STEP_LIMIT;
 }
 
-// How far the end of the step is from that of two halves, in the root mean square, 1 where it is tolerated.
+// Distance of the end of the step from that of two halves, in the root mean square, 1 where it is tolerated.
 static double symdyn_halved(symdyn_run *run, double h, const double *x_new) {
     double x[2][SYMDYN_NX], low[2][SYMDYN_NX];
     run->method.n_halved++;

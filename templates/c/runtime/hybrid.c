@@ -3,7 +3,7 @@
 #include "prelude.h"
 #include "hybrid.h"
 
-// What the library of this file exports.
+// Functions that the library of this file exports.
 SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h);
 SYMDYN_EXPORT int symdyn_hybrid_modes(int n, const int *rows, const int *excluded, const double *coefficients, const double *D,
     const double *b, const double *tolerances, int *mode, double *answer);

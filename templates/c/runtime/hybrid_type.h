@@ -2,9 +2,9 @@
 #pragma once
 
 typedef struct {
-    // The mechanism. Of every contact: its first row, their number, whether the first one is a normal one, places in p of what
-    // says that it is closed, that it sticks, the sign of its slip, and the events that end its modes: closes, opens, sticks,
-    // slips, ignored, counts; -1: there is none.
+    // The mechanism. Data of every contact: its first row, their number, whether the first one is a normal one, indices in p of
+    // the marks that it is closed, that it sticks, of the sign of its slip, and the events that end its modes: closes, opens,
+    // sticks, slips, ignored, counts; -1: there is none.
     int n_q, n_u, n_state, n_x, n_p, n_contacts, n_rows, n_events;  // n_x: with the work of the loads
     const int *first, *rows, *normal, *closed_at, *sticking_at, *sliding_at, *event;
     int shared_at;  // place in p of the softness of rows that depend on each other
@@ -36,7 +36,7 @@ typedef struct {
     long most_steps;  // attempted, of one phase, and of one call
     double touching, together, missed, no_speed, noise, dependent, different, energy, shortest_flight, lowest_flight, far;
 
-    // How slips begin, see symdyn/runtime/integrating/slip_begins.py.
+    // Beginnings of slips, see symdyn/runtime/integrating/slip_begins.py.
     double tolerated, rounded, shortest, guess, longest, grows, larger;
     int guesses;
 

@@ -2,12 +2,12 @@
 
 #include "moreau.h"
 
-// What the library of this file exports.
+// Functions that the library of this file exports.
 SYMDYN_EXPORT int symdyn_moreau_go(symdyn_moreau *s, symdyn_cones *c, const double *span, double *x, long n, double *out,
     long *ends, long *places, double *values, double *missed, long room, long *done);
 SYMDYN_EXPORT double symdyn_moreau_impulses(symdyn_cones *c, double tolerance, long most_sweeps);
 
-// Steps of one length from (t, x), in place, at most n; the state after each is a row of out. What contacts did in each goes to
+// Steps of one length from (t, x), in place, at most n; the state after each is a row of out. The contacts of each step go to
 // places (n_contacts*3: a, b, state) and values (n_contacts*10: gap and velocities at its end, impulses, velocities at its
 // begin), behind each other, as far as there is room; ends: how many after each step. Returns 0 or a failure; done: how many
 // steps.

@@ -23,8 +23,8 @@ enum {
     SYMDYN_MOREAU_INPUTS = -7
 };
 
-// What of a contact with a name closes: a gap; a speed, of a one-way clutch; nothing, of dry friction of a joint, which has no
-// normal row.
+// Quantity that closes a contact with a name: a gap; a speed, of a one-way clutch; nothing, of dry friction of a joint, which has
+// no normal row.
 enum { SYMDYN_PLACED = 0, SYMDYN_SPEED = 1, SYMDYN_BOUNDED = 2 };
 
 // Let all frames look at a time and a state.

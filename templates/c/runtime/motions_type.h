@@ -22,8 +22,8 @@ typedef struct {
     symdyn_report *reports;
     int *doubts;  // of every trajectory, see dropped_events.h
     int *next;    // the first trajectory that no thread has taken
-    // Attempts of a thread after all trajectories have been taken, until it puts its own down; 0: any number. What was put down,
-    // and how many; what was put down before, which are the n trajectories; 0: they begin.
+    // Attempts of a thread after all trajectories have been taken, until it puts its own down; 0: any number. Trajectories put
+    // down, and their number; those put down before, which are the n trajectories; 0: they begin.
     long turn;
     void *put;
     int *n_put;

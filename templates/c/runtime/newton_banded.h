@@ -1,6 +1,6 @@
 // The matrices of Newton's iteration in an order in which they have a narrow band: see symdyn/backend/band.py. The first states
 // of symdyn_sequence are coordinates whose rate is a multiple of one other state, which their rows eliminate; states of the band
-// come next, then those that nothing depends on. Of state i the entries of the derivative are symdyn_first[i] to
+// come next, then those that nothing depends on. The derivative of state i has its entries from symdyn_first[i] to
 // symdyn_first[i + 1], their columns places in this order.
 #pragma once
 
@@ -98,7 +98,7 @@ static inline __attribute__((always_inline)) void symdyn_newton_substitute(
     }
 }
 
-// The same for the state, and for every column of sensitivities. Of the first root B and y are zero.
+// The same for the state, and for every column of sensitivities. B and y are zero for the first root.
 static void symdyn_newton_solve(const symdyn_method *method, int root, double *restrict x, double *restrict y) {
     for (int first = 0; first < SYMDYN_NX; first += SYMDYN_STATE) {
         if (root > 0)

@@ -129,7 +129,7 @@ static int symdyn_gap(symdyn_run *run, double h, double z[][SYMDYN_NX], double e
     for (int i = 0; i < SYMDYN_NX; i++) y[i] = e[1][i] + symdyn_off * e[0][i];
     const double gap = 0.5 * sqrt(fmin(symdyn_square(run, e[1], x_new), symdyn_square(run, y, x_new))),
                  part = h / run->method.h_gap;
-    // What falls off more slowly than the square of the step is rounding: for some steps it does not count.
+    // A gap that falls off more slowly than the square of the step is rounding: for some steps it does not count.
     run->method.h_quiet = run->rejected && gap > run->method.gap * part * part ? 100.0 * fabs(h) : 0.7 * run->method.h_quiet;
     run->method.gap = gap;
     run->method.h_gap = h;

@@ -11,9 +11,9 @@ static double symdyn_arm(const symdyn_run *run, int i) {
 }
 
 // Close the gaps of the entries that are open, to first order: along the changes that forces along them make of x where the
-// constraints let them, by elimination with the largest pivots; gap then has these forces. What others determine has no say, nor
-// what would take the others a million times as far: the constraints hold it. What changes by it is `of`: x, or its derivative.
-// Returns 0 or 1.
+// constraints let them, by elimination with the largest pivots; gap then has these forces. Entries that others determine do not
+// count, nor those that would take the others a million times as far: the constraints hold them. The changed state is `of`: x, or
+// its derivative. Returns 0 or 1.
 static int symdyn_close(symdyn_run *run, double t, const double *x, int *open, double *gap, double *of) {
     enum { WIDTH = SYMDYN_NQ + SYMDYN_NU };
     double rows[SYMDYN_HELD * WIDTH], G[SYMDYN_HELD][SYMDYN_HELD];
@@ -137,8 +137,8 @@ static int symdyn_leaves_free(symdyn_run *run, double t, const double *x, const 
 }
 
 // The columns behind the state x that symdyn_keep_resets has made, in place: from those that the resets ask for to what they
-// become on the constraints. then: the rate of x; later: by how much the event comes later along each column. What is held is as
-// asked for, all else follows as it does for the state: see carried_columns. x_old: the state before. Returns 0 or a failure.
+// become on the constraints. then: the rate of x; later: by how much the event comes later along each column. Held entries are as
+// requested, all others follow as they do for the state: see carried_columns. x_old: the state before. Returns 0 or a failure.
 static int symdyn_keep_columns(
     symdyn_run *run, double t, const double *x_old, double *x, const int *asked, const double *then, const double *later) {
     enum { N = SYMDYN_STATE, WIDTH = SYMDYN_NQ + SYMDYN_NU };

@@ -34,8 +34,9 @@ typedef struct {
     int reason;
     long bad_index;
     double t_fail, x_fail[SYMDYN_NX];
-    // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
-    // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
+    // Latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
+    // and its row, else -1. All projections: the largest changes after a step, steps whose end was moved, calls of the
+    // corrections.
     double dq, du, residual, largest_dq, largest_du;
     double moved, largest_moved, t_moved;  // how far the latest end was moved, in tolerances; of all the most, and when
     int worst, of_speeds;
@@ -86,7 +87,7 @@ static inline double symdyn_scale(const symdyn_run *run, int i, double x_new) {
     return 1.0 / (run->atol[i] + run->rtol * size + symdyn_tiny);
 }
 
-// The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, does not count.
+// The mean square of v, 1 where it is the tolerated error of a step to x_new. Entries that are 0, without atol, do not count.
 static double symdyn_square(const symdyn_run *run, const double *v, const double *x_new) {
     double sum = 0.0;
     for (int i = 0; i < SYMDYN_NX; i++) {

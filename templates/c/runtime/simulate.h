@@ -78,7 +78,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     }
 }
 
-// What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
+// Report of the run; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
     const symdyn_run *const run = (const symdyn_run *)memory;
     const symdyn_report now = {

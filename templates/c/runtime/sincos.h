@@ -48,7 +48,8 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     *cosine = b.value;
 }
 
-// Of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
+// Sines and cosines of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange
+// sums.
 static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
 #if defined(__FAST_MATH__)
     const double largest = -1.0;

@@ -23,7 +23,7 @@ static int symdyn_constants_of(const double *p, double *out) {
     return code ? code : symdyn_all_finite(out, SYMDYN_NC) ? 0 : SYMDYN_NOT_FINITE;
 }
 
-// Of n sets of parameters, given as those of the states; out: constants, codes: what the function `reason` explains.
+// Constants of n sets of parameters, given as those of the states; out: constants, codes: those of the function `reason`.
 SYMDYN_KERNEL void SYMDYN_NAME(constants)(symdyn_state_rows rows) {
     const symdyn_table parameters = rows.given[3];
     for (long i = SYMDYN_FIRST; i < rows.n; i += SYMDYN_EVERY) {
@@ -34,7 +34,7 @@ SYMDYN_KERNEL void SYMDYN_NAME(constants)(symdyn_state_rows rows) {
     }
 }
 
-// What cannot be computed is not a number.
+// Rates of states that cannot be computed are not numbers.
 SYMDYN_KERNEL void SYMDYN_NAME(states)(symdyn_state_rows rows) {
     const symdyn_table times = rows.given[0], states = rows.given[1], values = rows.given[2], parameters = rows.given[3];
     for (long i = SYMDYN_FIRST; i < rows.n; i += SYMDYN_EVERY) {

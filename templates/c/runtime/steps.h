@@ -45,7 +45,7 @@ static void symdyn_propose(symdyn_run *run) {
     run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
-// What becomes of a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
+// Accept or reject a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
 static void symdyn_judge(symdyn_run *run, int failure, double err, double root, const double *x_new, const double *xd_new) {
     const double h = fabs(run->h_try);
     double grow;

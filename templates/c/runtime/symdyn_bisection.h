@@ -1,8 +1,7 @@
 // Intervals of splines.
 #pragma once
 
-// Between which of the growing numbers t x lies, the place of the lower one, from low to high - 1; beyond the ends those of the
-// ends.
+// Index of the lower one of the growing numbers t between which x lies, from low to high - 1; beyond the ends that of the end.
 static int symdyn_interval(const double *t, int low, int high, double x) {
     while (high - low > 1) {
         const int middle = (low + high) / 2;

@@ -3,7 +3,7 @@
 
 #include "prelude.h"
 
-// What of the square |x|, |y| <= 1/2 lies where a (x + 1/2) + b (y + 1/2) < s, for a >= b >= 0.
+// Part of the square |x|, |y| <= 1/2 where a (x + 1/2) + b (y + 1/2) < s, for a >= b >= 0.
 // m: integrals of 1, x, y, x^2, x y, y^2; ends: (1, x, y, h) at both Gauss points of the line inside. Returns half its height.
 static double symdyn_cube_corner(double a, double b, double s, double h, double m[6], double ends[2][4]) {
     // Counted from a corner, it is as wide as the square below y0; then its width falls from w0 to w1 at y1.

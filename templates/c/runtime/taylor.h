@@ -172,7 +172,7 @@ static inline void symdyn_polynomial(const double *coefficients, int row, int de
 }
 
 // Whether a step is as good as its coefficients tell, which know nothing of a kink, a branch cut or a bend ahead: by what slope
-// and derivative at its end differ, times its length. Of smooth motion that is about the tolerance. Returns 0 for a tenth of it
+// and derivative at its end differ, times its length. This is about the tolerance for smooth motions. Returns 0 for a tenth of it
 // within the tolerance of each state, else that in the root mean square, 1 where it is tolerated.
 static inline double symdyn_defect(
     const symdyn_run *run, double h, const double *x_new, const double *xd_new, const double *slope) {
