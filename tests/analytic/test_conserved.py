@@ -1,4 +1,4 @@
-"""What is reported as conserved is constant along simulated motions, and textbook integrals are found."""
+"""Quantities reported as conserved are constant along simulated motions, and textbook integrals are found."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""What has no equilibria in closed form or no linear equations is said, and what looks like it but has them is found."""
+"""Systems without equilibria in closed form or without linear equations are reported, and those that only look like it are
+solved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What clang warns of in C and what does not count, with reasons; `faults_of` is empty where a text is clean."""
+"""Warnings of clang in C and those that do not count, with reasons; `faults_of` is empty where a text is clean."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
 LANGUAGE = ("-std=c99", "-ffp-contract=off")
 
-# Of -Weverything.
+# Warnings of -Weverything.
 ALLOWED_WARNINGS = {
     "padded": "records have gaps where the compiler wants them; no bytes of them are written to a file",
     "float-equal": "a comparison with == asks for the same bits: a step that ends where it should, a factor that is zero",
@@ -20,7 +20,7 @@ ALLOWED_WARNINGS = {
     "implicit-void-ptr-cast": "it asks for a cast that only C++ needs",
     "default-const-init-var": "in C a constant without a value is zero; only C++ forbids it",
 }
-# Of bugprone-* and clang-analyzer-*.
+# Checks of bugprone-* and clang-analyzer-*.
 ALLOWED_CHECKS = {
     "bugprone-easily-swappable-parameters": "neighbours of one type cannot be avoided where nearly all arguments are numbers",
     "bugprone-assignment-in-if-condition": "`if ((failure = f())) return failure;` is how failures are handed on",
@@ -36,7 +36,7 @@ CHECKS = ",".join(["-*", "bugprone-*", "clang-analyzer-*", *(f"-{name}" for name
 
 
 def faults_of(source: Path, *options: str, tidy: bool = True) -> str:
-    """What clang and, unless left out, clang-tidy report of a source, as far as there are such programs."""
+    """Reports of clang and, unless left out, clang-tidy on a source, as far as there are such programs."""
     reports = []
     if clang := shutil.which("clang"):
         reports.append([clang, *LANGUAGE, *WARNINGS, "-fsyntax-only", *options, str(source)])

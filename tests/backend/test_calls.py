@@ -184,7 +184,7 @@ def divided(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
 @needs_c
 @pytest.mark.parametrize(("name", "longest"), [("slider_crank", 10), ("pendulum_absolute", 5)])
 def test_calls_in_parts(name: str, longest: int, divided: Callable[[int], None]) -> None:
-    """What a call returns is read in the same part, and kept for later ones."""
+    """Results of a call are read in the same part, and kept for later ones."""
     divided(longest)
     made = emit(equations(name), "c", ("rhs", "lam"), standalone=False)
     for function in made.program.functions:

@@ -80,7 +80,7 @@ def test_extra_place_is_where_the_polynomial_is_farthest_from_stiff_motion(metho
 
 
 def test_slope_at_the_extra_place(method: Collocation) -> None:
-    """Of polynomials of degree s that begin at 0, and of the tail."""
+    """Slope of polynomials of degree s that begin at 0, and of the tail."""
     c, s = np.array(method.nodes), len(method.nodes)
     for k in range(1, s + 1):
         assert method.extra_slope[:s] @ c**k == pytest.approx(k * method.extra**(k - 1), abs=1e-12)

@@ -1,4 +1,4 @@
-"""What long functions have in common is written once, in a function that they call first: the same numbers in less code."""
+"""Common steps of long functions are written once, in a function that they call first: the same numbers in less code."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_those_functions_are_found_that_save_the_most() -> None:
 
 
 def test_a_step_is_checked_only_for_functions_that_demand_it() -> None:
-    """What is computed from it does not become common to others either."""
+    """Steps computed from it do not become common to others either."""
     recorder = Recorder()
     x = recorder.leaf("x", COORDINATE)
     pivot = recorder.sin(x)

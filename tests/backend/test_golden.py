@@ -14,7 +14,7 @@ from symdyn.pipeline import emit, write_source
 REFERENCE = Path(__file__).parents[2] / "generated" / "reference"
 FILES = {("pendulum", "c"): {"pendulum.c", "pendulum.h", "main.c"}, ("double_pendulum", "numpy"): {"double_pendulum.py"},
          ("four_bar", "c"): {"four_bar.c", "four_bar.h", "main.c"}, ("four_bar", "numpy"): {"four_bar.py"}}
-# Of mechanisms with loops what is particular to them.
+# Functions that mechanisms with loops have in addition.
 AUGMENTED = ("rhs", "C", "C_r", "F_d", "lam", "reactions")
 
 

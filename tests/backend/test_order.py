@@ -22,7 +22,7 @@ from symdyn.tape.tape import Tape
 
 
 def waiting(order: Sequence[Node], entries: Sequence[Any]) -> list[int]:
-    """How many values are still to be used, behind every step."""
+    """Number of values that are still to be used, behind every step."""
     last = {core: k for k, node in enumerate(order) for core in cores_of(node.args)}
     last |= dict.fromkeys(cores_of(entries), len(order))
     return [sum(last.get(node, -1) > k for node in order[:k + 1]) for k in range(len(order))]
@@ -88,6 +88,6 @@ def _text(equations: Any) -> str:
 
 
 def _operations(text: str) -> list[int]:
-    """How many of each kind there are, without comments."""
+    """Number of operations of each kind, without comments."""
     lines = "".join(line for line in text.splitlines() if "//" not in line)
     return [lines.count(word) for word in ("MADD(", "*", "/", " - ", " + ")]

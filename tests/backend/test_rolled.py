@@ -1,4 +1,5 @@
-"""What like bodies repeat, as loops: the bits of straight-line code, the numbers of many digits, and code that does not grow."""
+"""Repeated statements of like bodies, as loops: the bits of straight-line code, the numbers of many digits, and code that does
+not grow."""
 
 from __future__ import annotations
 

@@ -268,7 +268,7 @@ int newton(const double *jacobian, double h, int root, double *x, double *y) {
 
 
 def row_of_masses(n: int) -> tuple[Shape, np.ndarray, Band]:
-    """Of ROW the shape, where the derivative has entries, and its band: one state depends on another, all depend on one."""
+    """Shape of ROW, entries of the derivative, and its band: one state depends on another, all depend on one."""
     shape = Shape({"q": n, "u": n, "z": 2, "inputs": 0}, 0, (), ())
     pattern = np.zeros((2 * n + 2, 2 * n + 2), dtype=bool)
     pattern[:n, n:2 * n] = np.eye(n)

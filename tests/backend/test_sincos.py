@@ -141,7 +141,7 @@ def test_python_gives_the_same_within_an_ulp() -> None:
 
 
 def command(kind: str) -> str | None:
-    """How a compiler is called, if it is installed."""
+    """Command of a compiler, if it is installed."""
     if kind == "zig":
         return f"{sys.executable} -m ziglang cc" if importlib.util.find_spec("ziglang") else None
     if kind == "tcc":
@@ -195,7 +195,7 @@ def test_a_single_one_is_left_to_the_library() -> None:
 
 
 def test_angle_that_is_computed() -> None:
-    """What an angle needs comes before, what needs a sine does not take part."""
+    """Steps that an angle needs come before, steps that need a sine do not take part."""
     text = written(lambda r, a, b: [r.sin(a + b) + r.cos(a + b), r.cos(2 * b), r.sin(a * r.cos(a))], names=["a1", "a2"])
     lines = text.splitlines()
     (angles,) = [line for line in lines if "angles[]" in line]

@@ -1,4 +1,4 @@
-"""What a mechanism does not need is not there: seen in operation counts and in the written source."""
+"""Code that a mechanism does not need is not there: seen in operation counts and in the written source."""
 
 from __future__ import annotations
 

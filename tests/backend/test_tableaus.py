@@ -14,7 +14,7 @@ from symdyn.backend.methods import METHODS, Method, method_of
 from symdyn.errors import SymdynError
 
 PAIRS = [m for m in METHODS.values() if m.tableau is not None]
-# What the coefficients, stored as doubles, leave of a condition.
+# Residual of a condition with the coefficients stored as doubles.
 ROUNDING = 3e-14
 
 
@@ -47,7 +47,7 @@ def density(tree: Any) -> int:
 
 @functools.cache
 def weights(name: str, tree: Any) -> list[Fraction]:
-    """Of every slope k[j], that of dense output and of the end included."""
+    """Weights of every slope k[j], that of dense output and of the end included."""
     t = METHODS[name].tableau
     rows = [{**t.a, t.n_stages: t.b}.get(j, {}) for j in range(t.n_slopes)]
     product = [Fraction(1)] * t.n_slopes
@@ -90,7 +90,7 @@ def test_nodes_are_sums_of_rows(method: Method) -> None:
 
 @pytest.mark.parametrize(("name", "order", "estimate", "between"), [("bs54", 5, 4, 4), ("dop853", 7, 5, 6)])
 def test_order_conditions(name: str, order: int, estimate: int, between: int) -> None:
-    """Of the solution, of the embedded solution, of the dense output; order 8 is shown by the measured order."""
+    """Conditions of the solution, of the embedded solution, of the dense output; order 8 is shown by the measured order."""
     method = METHODS[name]
     t = method.tableau
     third = {k: -v for k, v in (t.second or {}).items()}  # b + second is the difference to it

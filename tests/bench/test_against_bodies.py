@@ -105,7 +105,7 @@ def test_a_loop_by_generalized_alpha() -> None:
 
 
 def pinocchio_accelerations(tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """What the Python package of Pinocchio makes of the description that it is given as text."""
+    """Accelerations by the Python package of Pinocchio from the description that it is given as text."""
     pin = pytest.importorskip("pinocchio")
     model = pin.Model()
     for line in pinocchio_aba.description(tree).splitlines():
@@ -211,7 +211,7 @@ def test_inertia_that_no_body_has() -> None:
 
 
 def test_steps_for_a_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a method of order four, whose error is known."""
+    """Steps of a method of order four, whose error is known."""
     steps = calibrated(lambda n: (1e-6 * n, np.array([1.0 + 1e6 / n**4])), 4)
     for tolerance in (1e-4, 1e-8):
         assert 0.3 * tolerance < 1e6 / steps(tolerance) ** 4 < 1.2 * tolerance

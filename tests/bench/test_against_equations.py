@@ -42,7 +42,7 @@ class Motion:
     system: Any
 
     def error(self, peer: Peer, tolerances: Sequence[float]) -> list[float]:
-        """Of the end, relative, at each tolerance; times and counts are looked at."""
+        """Error of the end, relative, at each tolerance; times and counts are looked at."""
         run = peer.prepare(self.equations, self.params, self.x0, self.end, self.system)
         errors = []
         for tolerance in tolerances:

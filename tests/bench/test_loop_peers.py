@@ -47,7 +47,7 @@ def test_generated_code_of_casadi_and_sympy_agrees() -> None:
 
 
 def test_pinocchio_agrees() -> None:
-    """What pinocchio_loop.cpp solves, through Pinocchio's Python package: to build it takes minutes."""
+    """Pinocchio's Python package solves the same as pinocchio_loop.cpp: to build it takes minutes."""
     pin = pytest.importorskip("pinocchio", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
     system = get("four_bar")
     equations = fastest(system)

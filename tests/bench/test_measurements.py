@@ -151,7 +151,7 @@ def test_stress_reports_what_is_missing_before_anything_is_run(tmp_path: Path, c
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
 def test_commands_in_texts_are_there(path: Path) -> None:
-    """What README, pages, notebooks and the change log call is a word or a mechanism; every word is on the page of figures."""
+    """Calls in README, pages, notebooks and the change log have a word or a mechanism; every word is on the page of figures."""
     text = path.read_text(encoding="utf-8")
     named = set(re.findall(r"symdyn bench (\w+)\b(?!\.py)", text))
     assert named <= {*MEASUREMENTS, *known(), "NAME"}

@@ -1,4 +1,4 @@
-"""What a picture of a page costs: the command measures, and reports what it needs."""
+"""Cost of a picture of a page: the command measures, and reports what it needs."""
 
 from __future__ import annotations
 

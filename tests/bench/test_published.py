@@ -110,7 +110,7 @@ def test_loosest_tolerances_within_the_bounds_are_timed(short):
             best = line.within(bound)
             assert best.error <= bound and best.time == min(r.time for r in line.runs if r.error <= bound and r.seconds)
             kept = max(r.tolerance for r in line.runs if r.error <= bound)
-            # What is next looser was tried, and is off by more.
+            # The next looser tolerance was tried, and is off by more.
             assert any(kept < r.tolerance <= 10 * kept and not r.error <= bound for r in line.runs) or kept > 0.3
     assert "no constraints" in short.left_out["IDA"] and "GeneralizedAlpha" in " ".join(short.left_out)
     assert short.reference == "closed form" and not short.missed()  # SciPy calls Python

@@ -1,4 +1,4 @@
-"""What the figures of sensitivities say where the programs that they are compared with are not installed."""
+"""Figures of sensitivities where the programs that they are compared with are not installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the bench of batches counts in machine code."""
+"""Counts of the bench of batches in machine code."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def test_options_in_names_and_apart_from_them_are_checked(tmp_path):
             sd.bench(name)
     assert named_case("n_link_pendulum", None, {"n": 2}).name == "n_link_pendulum_n_2"
     assert named_case("heavy_top", None, {"orientation": "parameters"}).names[0] == "embedding"
-    # What is known of a motion is known of the usual options.
+    # The known motion is that with the usual options.
     assert named_case("lagrange_top").closed and named_case("lagrange_top", None, {"orientation": "parameters"}).closed is None
     assert list(named_case("lagrange_top", None, {"orientation": "parameters"}).variants) == [""]
     for options, told in (({"m": 2}, "has no option 'm'; it has n=5"), ({"n": 1.5}, "must be of the kind int")):

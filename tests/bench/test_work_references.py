@@ -138,7 +138,7 @@ def test_errors_in_other_coordinates_are_those_of_bodies(pendulum):
     assert np.max(comparison.errors(absolute, x)) < 1e-11
     x[1, 2] += 1e-3  # rad
     q, _ = comparison.errors(absolute, x)
-    # Of the origin, at the pivot, and nine entries of R with the norm sqrt(3), two pairs of which turn.
+    # Norms of the origin, at the pivot, and of nine entries of R with the norm sqrt(3), two pairs of which turn.
     assert abs(q[1] - 1e-3 * np.sqrt(2 / 3)) < 1e-5 and q[0] < 1e-11
     everything = Comparison(reference, first, bodies=True)
     x = first.module.simulate([0.0, *times], rtol=1e-14).x[1:]

@@ -51,7 +51,7 @@ def runs(name: str, methods: Sequence[str], file: Path) -> None:
 
 
 def measured(root: Path, name: str, methods: Sequence[str]) -> dict[str, Any]:
-    """What `runs` gives in a tree; where it fails, the last line of what it prints for each method."""
+    """Result of `runs` in a tree; where it fails, the last line of what it prints for each method."""
     with tempfile.TemporaryDirectory() as made:
         known = {**os.environ, "PYTHONPATH": str(root), "SYMDYN_CACHE_DIR": made}
         known.pop("SYMDYN_CC", None)
@@ -67,7 +67,7 @@ def measured(root: Path, name: str, methods: Sequence[str]) -> dict[str, Any]:
 
 
 def difference(now: Any, then: Any) -> str:
-    """What one method's runs differ in, for the table."""
+    """Difference of one method's runs, for the table."""
     if isinstance(now, str) or isinstance(then, str):
         return "-" if now == then else f"now {_short(now)}; then {_short(then)}"
     if json.dumps(now) == json.dumps(then):  # NaN equals NaN, and -0.0 is not 0.0

@@ -49,7 +49,7 @@ class Target:
     sines: bool = False
 
     def command(self) -> list[str] | None:
-        """What its programs run under here, or None where that is missing."""
+        """Command that its programs run under here, or None where that is missing."""
         if self.runner is None:
             return None
         if not self.runner:
@@ -93,14 +93,14 @@ def output(runner: list[str], program: Path) -> str:
 
 
 def numbers(bits: str) -> np.ndarray:
-    """What a program of a trajectory has printed, as numbers."""
+    """Output of a program of a trajectory, as numbers."""
     words = [line.split()[-1] for line in bits.splitlines() if not line.startswith("status")]
     return np.array([int(word, 16) for word in words], dtype=np.uint64).view(float)
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_shared_libraries(name: str, mechanism: Written, tmp_path: Path) -> None:
-    """Of the written file, and of the translation units that a module is compiled from."""
+    """Libraries of the written file, and of the translation units that a module is compiled from."""
     target = TARGETS[name]
     shared = ["-shared", *([] if "windows" in name else ["-fPIC"])]
     library = compiled(target, tmp_path / f"whole{target.suffix}", *shared, mechanism.source)

@@ -20,8 +20,8 @@ from tests.helpers import CONTRAST, browser
 # As wide as screens, with and without the contents of a page at its side, and as a telephone.
 WIDTHS = 1400, 1280, 1100, 400
 HEIGHT = 900
-# Of the text of a page what reaches beyond its column, and of boxes that cut what they hold; headings and boxes of tables reach
-# half a rem beyond it in this theme. What scrolls within a box is seen.
+# Text of a page that reaches beyond its column, and boxes that cut what they hold; headings and boxes of tables reach
+# half a rem beyond it in this theme. Content that scrolls within a box is seen.
 WIDER = """() => {
     const column = document.querySelector(".content"), html = "http://www.w3.org/1999/xhtml";
     const right = column ? column.getBoundingClientRect().right + 9 : innerWidth;
@@ -33,7 +33,7 @@ WIDER = """() => {
             || (/hidden|clip/.test(getComputedStyle(e).overflowX) && e.clientWidth && e.scrollWidth > e.clientWidth + 1)
         )).map(e => `${e.tagName}.${e.className}: ${e.textContent.trim().slice(0, 40)}`);
 }"""
-# What the keyboard should reach, and a list of what it has reached without an outline.
+# Elements that the keyboard should reach, and a list of those that it has reached without an outline.
 LISTEN = """() => {
     window.reached = new Set();
     window.unseen = new Set();
@@ -90,7 +90,7 @@ class CheckedPage:
             yield from (f"contrast in the {theme} theme: {one}" for one in self.page.evaluate(CONTRAST))
 
     def unreached(self) -> Iterator[str]:
-        """What Tab does not reach in a cycle, or without an outline."""
+        """Elements that Tab does not reach in a cycle, or without an outline."""
         count = self.page.evaluate(LISTEN)
         views = self.page.evaluate("document.querySelectorAll('iframe').length")
         for k in range(count + MORE + IN_VIEW * views):
@@ -109,7 +109,7 @@ class CheckedPage:
             yield "the picture is blank"
 
 
-# Of the picture of a view.
+# Faults of the picture of a view.
 COLORS = """() => { const { stage } = symdyn, { canvas, renderer } = stage, gl = renderer.gl;
     stage.draw(false);
     const p = new Uint8Array(4 * canvas.width * canvas.height);
@@ -122,7 +122,7 @@ def pages(site: Path) -> list[Path]:
 
 
 def faults(checked: CheckedPage, file: Path) -> Iterator[str]:
-    """Of a page of text."""
+    """Faults of a page of text."""
     yield from checked.open(file)
     yield from checked.wider()
     yield from checked.unreadable()

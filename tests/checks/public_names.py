@@ -1,4 +1,4 @@
-"""How many public names have an entry in the reference of a built site, and an example that runs.
+"""Number of public names with an entry in the reference of a built site, and an example that runs.
 
 python -m sphinx -W -b html docs generated/site && python tests/checks/public_names.py generated/site
 

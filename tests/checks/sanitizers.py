@@ -18,7 +18,7 @@ from tests.checks.programs import written
 
 ROOT = Path(__file__).parents[2]
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
-# How the library of the address sanitizer is named, and what makes a compiler link it as a shared one.
+# Name of the library of the address sanitizer, and the option by which a compiler links it as a shared one.
 COMPILERS = {"gcc": ("libasan.so", ()), "clang": ("libclang_rt.asan-x86_64.so", ("-shared-libasan",))}
 OPTIONS = ("-std=c99", "-O1", "-ffp-contract=off", "-DEXACT")
 

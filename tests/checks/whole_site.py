@@ -1,4 +1,4 @@
-"""How long the site takes that is built from nothing: no page of the gallery, no tutorial, no compiled mechanism kept.
+"""Time of a site that is built from nothing: no page of the gallery, no tutorial, no compiled mechanism kept.
 
 python tests/checks/whole_site.py generated/site
 """

@@ -71,7 +71,7 @@ def test_each_proof_distinguishes_the_wrong_formula_from_the_right_one(printed, 
     assert found.decided and found.counts[Verdict.WRONG] >= 1
     ((_, shown),) = found.errata
     assert shown.evidence.holds and shown.evidence.printed > 1e-6 and shown.evidence.right < 1e-25
-    # What is printed right cannot be proven wrong: with the sides changed the proof fails.
+    # A formula that is printed right cannot be proven wrong: with the sides changed the proof fails.
     exchanged = compare(sd.Formula("f", derived, printed, errata=[erratum]))
     assert not exchanged.decided and not exchanged.errata
     assert "the proof does not hold" in str(exchanged)

@@ -90,7 +90,7 @@ def test_gradient_across_infinitely_many_impacts_of_what_moves_along_names_sensi
 
 
 def test_integral_of_a_loss_over_impacts(ball: Any) -> None:
-    """Of y^2 + y_dot^2 over a fall and the first flight, in closed form piece by piece."""
+    """Integral of y^2 + y_dot^2 over a fall and the first flight, in closed form piece by piece."""
     (h, _, e, g), end = sp.symbols("h v e g", positive=True), 1.0
     t, fall, speed = sp.Symbol("t"), sp.sqrt(2 * h / g), sp.sqrt(2 * g * h)
     first = sp.integrate(sp.expand((h - g * t**2 / 2) ** 2 + g**2 * t**2), (t, 0, fall))
@@ -238,7 +238,7 @@ def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 @pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)
 def test_gradient_of_where_a_mass_sticks_on_a_slope(in_space: Any, down: float, vx: float, vy: float, method: str) -> None:
-    """By what it slides away with, friction, and what pulls it down."""
+    """Gradient by the speed it slides away with, by friction, and by the force that pulls it down."""
     expected, values = rest_on_slope(), (vx, vy, 0.3, down)
     end, names = expected["end"](*values), ["x_dot(0)", "y_dot(0)", "mu", "down"]
     x, y = sp.symbols("x y")
@@ -251,7 +251,7 @@ def test_gradient_of_where_a_mass_sticks_on_a_slope(in_space: Any, down: float, 
 
 
 def test_integral_over_a_slip_in_space_and_the_rest_after_it(in_space: Any) -> None:
-    """Of x^2, for a mass that slides straight along x from 1 m/s on and rests from T = 1/(mu g) on."""
+    """Integral of x^2, for a mass that slides straight along x from 1 m/s on and rests from T = 1/(mu g) on."""
     t, v, mu = sp.symbols("t v mu", positive=True)
     stops, x = v / (mu * G), v * t - mu * G * t**2 / 2
     whole = sp.integrate(sp.expand(x**2), (t, 0, stops)) + x.subs(t, stops) ** 2 * (1 - stops)

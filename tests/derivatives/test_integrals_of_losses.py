@@ -53,7 +53,8 @@ def times_at(q: float) -> list[float]:
 
 
 def by_jumps(q: float, size: float) -> float:
-    """What jumps of the integrand by `size` where q rises past a place make of the derivative by k: at each dt/dk = -t/(2 k)."""
+    """Contribution of jumps of the integrand by `size`, where q rises past a place, to the derivative by k: at each dt/dk = -t/(2
+    k)."""
     return sum(-size * way * -t / (2 * W**2) for t, way in zip(times_at(q), (-1, 1), strict=True) if t < END)
 
 

@@ -99,7 +99,7 @@ def test_derivatives_against_differences() -> None:
 
 
 def test_every_executor_gives_the_same_bytes(tmp_path: Path) -> None:
-    """Of outputs, too; other processes get the code as text."""
+    """Bytes of outputs, too; other processes get the code as text."""
     system = sd.systems.get("double_pendulum")
     system.add_output("tip", sd.position(system.bodies[-1], [1, 0]))
     module = system.embedding().compile()

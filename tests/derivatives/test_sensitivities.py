@@ -75,7 +75,7 @@ def swing(t: Any, g: Any, length: Any, start: Any) -> Any:
 
 
 def derivatives(function: Callable[..., Any], times: np.ndarray, at: dict[str, float]) -> np.ndarray:
-    """Of a closed form of t and some numbers by each of them, (n_t, n), by differences at 40 digits."""
+    """Derivatives of a closed form of t and some numbers by each of them, (n_t, n), by differences at 40 digits."""
     with mp.workdps(40):
         values = [mp.mpf(v) for v in at.values()]
         step = mp.mpf(10) ** -13
@@ -371,7 +371,7 @@ def test_what_cancels_has_no_effect() -> None:
     with pytest.warns(SimulationWarning, match="nothing in this motion depends on factor, which cancels") as found:
         run = module.simulate(t, [2.9, 0.4], rtol=1e-10, sensitivities=["factor", "push", "a(0)"])
     assert len(found) == 1 and np.abs(run.sensitivity["factor"]).max() > 1e-11
-    # What acts where there are no rows has an effect.
+    # A load that acts where there are no rows has an effect.
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run = module.simulate(np.array([0, 3.0]), [0.1, 0.1], rtol=1e-10, sensitivities=["push"])

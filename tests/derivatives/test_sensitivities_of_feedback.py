@@ -109,7 +109,7 @@ def test_outputs_and_motions_where_one_of_the_inputs_is_held(name: str) -> None:
 
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 def test_gradients_backwards(method: str) -> None:
-    """Of a loss with the inputs in it, across events with resets, and without them."""
+    """Gradients of a loss with the inputs in it, across events with resets, and without them."""
     x, F, T = sp.symbols("x F T")
     values = dict(zip(("x", "q", "x_dot", "q_dot"), sp.symbols("x q x_dot q_dot"), strict=True))
     force = -2 * values["x"] + sp.sin(values["q"]) - values["x_dot"] ** 3 / 5

@@ -118,7 +118,7 @@ def entangled() -> Any:
 
 
 def test_order_that_matters_is_warned_of() -> None:
-    """By what moves both alike there is a derivative, without a warning."""
+    """There is a derivative, without a warning, by a parameter that moves both alike."""
     with pytest.warns(SimulationWarning, match=r"the events hit_y1, hit_y2 happen at one time, t = 0.4515\d* s, and what they do "
                                                r"together depends on their order.*; take another start, or one event with all"):
         entangled().simulate((0, 0.6), rtol=1e-11, sensitivities=["y1(0)"])

@@ -194,7 +194,7 @@ def test_the_script_has_what_the_file_asks_for():
     (Cluster("slurm", 2, nodes=True, gpus=4), "0,2,5,7", "0 2 5 7"), (Cluster("slurm", 2, nodes=True), None, "0"),
     (Cluster("slurm", 2, 8, gpus=2), "3,1", "1 3")])
 def test_every_gpu_of_a_job_has_a_worker(tmp_path, cluster, given, used):
-    """Which all get the sign that the time is over, and whose failure is that of the job."""
+    """All workers get the sign that the time is over, and their failure is that of the job."""
     worker = tmp_path / "worker"
     worker.write_text("#!/bin/sh\ntrap 'echo ends > $1.ended; exit 130' TERM\n"
                       'echo "$CUDA_VISIBLE_DEVICES" > "$1.$CUDA_VISIBLE_DEVICES"\n'
@@ -370,7 +370,7 @@ def test_a_time_limit_that_is_too_short_for_all_is_no_fault(tmp_path, capsys, qu
 
 @pytest.mark.skipif(shutil.which("nvidia-smi") is not None, reason="there may be a GPU")
 def test_a_sweep_on_gpus_is_submitted_where_there_is_none(tmp_path, capsys, queue):
-    """What the worker lacks is found out by the worker."""
+    """The worker finds out what it lacks."""
     table = "[cluster]\nkind = \"slurm\"\nworkers = 1\ntime = 00:10:00\ngpus = 2\n"
     path, out = write(tmp_path, "device = \"gpu\"", table, chunk=20), tmp_path / "out"
     assert main(["sweep", path, "--output", str(out), "--dry-run"]) == 0

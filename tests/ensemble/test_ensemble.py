@@ -538,7 +538,7 @@ def test_ctrl_c_keeps_what_was_done(module, tmp_path, monkeypatch):
 
 
 class Sending(ThreadPoolExecutor):
-    """What it gets goes through bytes, as between processes."""
+    """Its arguments go through bytes, as between processes."""
 
     def submit(self, function, chunk):
         return super().submit(function, pickle.loads(pickle.dumps(chunk)))

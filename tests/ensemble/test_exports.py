@@ -18,7 +18,7 @@ OUTCOMES = ["end q1", "trace q2", "grad end q1"]
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """Of 40 members the last fails."""
+    """The last of 40 members fails."""
     lengths = np.linspace(0.5, 1.5, 40)
     lengths[-1] = np.nan
     return sd.ensemble(recall("double_pendulum", {}), {"l1": lengths, "q1": np.linspace(-1, 1, 40)}, np.linspace(0, 0.2, 5),
