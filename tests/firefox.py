@@ -23,7 +23,7 @@ PREFERENCES = {
     "webgl.force-enabled": True, "webgl.disabled": False, "app.update.enabled": False, "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False, "browser.startup.page": 0, "browser.aboutwelcome.enabled": False,
     "network.captive-portal-service.enabled": False, "network.connectivity-service.enabled": False}
-# What the console has of the page, and the requests that OBSERVE has seen.
+# Messages of the page on the console, and the requests that OBSERVE has seen.
 SAID = """return [...Services.console.getMessageArray().filter(
     m => m instanceof Ci.nsIScriptError && m.sourceName.startsWith(arguments[0])).map(m => m.errorMessage),
     ...window.symdynAsked.splice(0)];"""
@@ -94,7 +94,7 @@ class FirefoxPage:
         self._run("Marionette:SetContext", value="content")
 
     def _of_browser(self, script: str, argument: Any) -> Any:
-        """What a script of the browser returns; its sandbox stays, and with it what observes requests."""
+        """Result of a script of the browser; its sandbox stays, and with it what observes requests."""
         return self._run("WebDriver:ExecuteScript", script=script, args=[argument], sandbox="symdyn", newSandbox=False)
 
     def goto(self, address: str) -> None:
@@ -124,7 +124,7 @@ class FirefoxPage:
         return self.evaluate("selector => document.querySelector(selector).textContent", selector)
 
     def said(self) -> list[str]:
-        """What the console has of the page, and what pages have asked the network for."""
+        """Messages of the page on the console, and requests of pages to the network."""
         with self._inside():
             found: list[str] = self._of_browser(SAID, self._address)
         return found

@@ -1,4 +1,4 @@
-"""What several tests share: numbers for the inputs of a tape, closeness at 30 digits, a pendulum in closed
+"""Helpers of several tests: numbers for the inputs of a tape, closeness at 30 digits, a pendulum in closed
 form, a browser."""
 
 from __future__ import annotations

@@ -7,8 +7,8 @@
 Each mutant is one changed operator, comparison, condition, constant or result in model, formulation, tape, backend or runtime. It
 stands in a copy of the working tree, where the tests that enter the changed function run, those first that enter few others,
 until one fails; then the other tests of their files. One that takes far more processor time than the tests need counts as
-killed. Which test enters which function is noted once, in a copy whose functions count themselves; tests that only enter it in
-other processes (notebooks, commands) are not seen. `--folder` holds the notes and the results, a line of JSON for each mutant.
+killed. The functions that each test enters are noted once, in a copy whose functions count themselves; tests that only enter it
+in other processes (notebooks, commands) are not seen. `--folder` holds the notes and the results, a line of JSON for each mutant.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a mutant: "killed" (`by` is the test), "endless", "survived", or "unseen" by any test."""
+    """Fate of a mutant: "killed" (`by` is the test), "endless", "survived", or "unseen" by any test."""
 
     name: str
     file: str
@@ -182,7 +182,7 @@ def _is_head(node: ast.stmt) -> bool:
 
 @dataclass(frozen=True)
 class Tests:
-    """What is noted of the tests: the seconds of each, how many functions it enters, and the tests that enter a function."""
+    """Notes on the tests: the seconds of each, how many functions it enters, and the tests that enter a function."""
 
     seconds: dict[str, float]
     breadth: dict[str, int]
@@ -190,7 +190,7 @@ class Tests:
 
     @classmethod
     def read(cls, notes: Path) -> Tests:
-        """From what was noted; the last line of a test counts."""
+        """Read from the notes; the last line of a test counts."""
         lines = [json.loads(line) for line in (notes / "tests.jsonl").read_text(encoding="utf-8").splitlines()]
         last = {line["test"]: line for line in lines}
         names = {number: name for name, number in json.loads((notes / "functions.json").read_text(encoding="utf-8")).items()}

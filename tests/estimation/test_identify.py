@@ -17,7 +17,8 @@ from symdyn.estimation.pseudo_inertia import Chart, _At, is_consistent, nearest,
 from tests.helpers import swept
 
 T = np.linspace(0, 10, 301)
-# What a distribution of mass can have: the published I3_yy exceeds I3_xx + I3_zz, and link 1 has an inertia about one axis alone.
+# Moments of inertia that a distribution of mass can have: the published I3_yy exceeds I3_xx + I3_zz, and link 1 has an inertia
+# about one axis alone.
 REAL = {"m1": 13.0, "I1_xx": 0.3, "I1_zz": 0.2, "I3_yy": 0.07}
 NOISE = np.array([1.0, 1.0, 0.5, 0.1, 0.1, 0.05]) / 2
 FULL = np.ones(6)
@@ -60,7 +61,7 @@ def measured(seed: int, noise: np.ndarray = NOISE, **more: Any) -> sd.MeasuredMo
 
 
 def distance(found: Any, truth: np.ndarray, B: np.ndarray | None = None) -> float:
-    """Of the values, or of B values, from the truth, squared, in units of the covariance."""
+    """Distance of the values, or of B values, from the truth, squared, in units of the covariance."""
     B = np.eye(len(truth)) if B is None else B
     off = B @ np.array(list(found.values.values())) - truth
     return float(off @ np.linalg.solve(B @ found.covariance @ B.T, off))
@@ -98,7 +99,7 @@ def test_covariance_against_many_repetitions() -> None:
 
 @pytest.mark.parametrize("seeds", [range(15), *swept([range(15, 60)])], ids=str)
 def test_consistent_parameters_are_no_farther_than_others(seeds: range) -> None:
-    """What is nearest in a convex set that holds the truth is nearer to it than what is nearest anywhere."""
+    """The nearest point of a convex set that holds the truth is nearer to it than the nearest point anywhere."""
     noise = dict(zip(robot().metadata.u, NOISE, strict=True))
     q, u, ud = motion()
     at = np.hstack([q, u])

@@ -51,7 +51,7 @@ def crank(values: Any, seed: int) -> np.ndarray:
 def test_identified_parameters_predict_another_motion() -> None:
     q, u, ud, tau = motion()
     found = sd.identify(linkage(), sd.MeasuredMotion(T, q, tau, u, ud), noise=1e-3)
-    # Of six base parameters of the tree the crank's torque determines fewer; these predict it in another motion.
+    # The crank's torque determines fewer than the six base parameters of the tree; these predict it in another motion.
     assert found.undetermined and len(found.values) == 6 and found.degrees == len(T) - 6 + len(found.undetermined)
     turning = np.abs(motion(1)[1][:, 0]) > 0.5
     exact = motion(1)[3][:, 0]
@@ -76,7 +76,7 @@ def test_open_combinations_are_named_with_all_their_parts() -> None:
 
 
 def test_covariance_of_noisy_torques() -> None:
-    """Of many draws the errors of the torque that is predicted are as large as the covariance says, behind a filter as well."""
+    """The errors of the predicted torque in many draws are as large as the covariance states, behind a filter as well."""
     q, u, ud, tau = motion()
     names, chosen = list(sd.identify(linkage(), sd.MeasuredMotion(T, q, tau, u, ud), noise=0.2).values), slice(0, None, 40)
     open_ones = sd.identify(linkage(), sd.MeasuredMotion(T, q, tau, u, ud), noise=0.2)

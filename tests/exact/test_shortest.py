@@ -1,4 +1,4 @@
-"""What exact algebra writes has the value of what was given, reads back as the same, and is never longer."""
+"""Expressions that exact algebra writes have the value of those given, read back as the same, and are never longer."""
 
 import gc
 import weakref
@@ -84,7 +84,7 @@ def test_every_form_is_the_same_and_none_is_shorter(form):
 @pytest.mark.parametrize(("name", "formulation", "quantities"), [
     ("three_link_arm", "embedding", ("M_tilde", "k_tilde", "F_tilde", "J", "energy")),
     ("flyball_governor", "embedding", ("M_tilde", "k_tilde", "V")),
-    # What the multiplier is divided by is a sum of products or of turns, of which the second takes up the sign.
+    # The divisor of the multiplier is a sum of products or of turns, of which the second takes up the sign.
     ("slider_crank", "augmented", ("M_tilde", "k_tilde", "C", "C_r", "F_d", "lam", "inverse_dynamics")),
     ("car_axis", "augmented", ("M_tilde", "F_tilde", "C", "C_r", "F_d")),
     ("andrews_squeezer", "augmented", ("M_tilde", "k_tilde"))])
@@ -255,7 +255,7 @@ def test_the_number_common_to_all_terms_is_taken_out(given, wanted):
 
 
 def test_nothing_is_left_to_the_collector():
-    """What a quantity took is large: a search for it takes longer than to write many a quantity."""
+    """The memory that a quantity took is large: a search for it takes longer than to write many a quantity."""
     made = []
     entries, symbols = recorded([a * sp.sin(q1 + q2) + b])
     gc.disable()

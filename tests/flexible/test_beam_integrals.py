@@ -78,7 +78,7 @@ def sampled_energy(v, omega, eta, etad) -> float:
 
 
 def test_kinetic_energy_is_complete_to_second_order(body) -> None:
-    """What is left out is of third order: when the amplitude halves, its odd part falls by 8, its even part by 16."""
+    """The omitted part is of third order: when the amplitude halves, its odd part falls by 8, its even part by 16."""
     rng = np.random.default_rng(5)
 
     def error(a: float) -> float:
@@ -195,7 +195,7 @@ def test_samples_give_what_the_polynomial_gives() -> None:
 
 
 def test_splines_through_values_come_near_the_shape() -> None:
-    """Of a mode with a node, 11 values give its stiffness to a hundredth, 41 to 1e-4."""
+    """11 values of a mode with a node give its stiffness to a hundredth, 41 to 1e-4."""
     exact = sd.Beam([0, 1], 1.0, 1.0, 4).modal
     x = np.linspace(0, 1, 41)
     mode = CubicSpline(exact.X, exact.Psi[:, 0, 2], bc_type=((1, 0), (2, 0)))(x)

@@ -284,8 +284,8 @@ def test_reactions_of_loops_move_every_free_body_and_do_no_work(make: Callable[[
 
 
 def check_free_bodies(system: sd.System, equations: Equations) -> None:
-    """Of systems under gravity alone. On each body: m a = sum of forces, I alpha + omega x I omega = sum of moments; the
-    reaction of each joint is at right angles to what each speed moves in it."""
+    """Free bodies of systems under gravity alone. On each body: m a = sum of forces, I alpha + omega x I omega = sum of moments;
+    the reaction of each joint is at right angles to what each speed moves in it."""
     model = system.check()
     positions, rotations, J = twists(system, equations)
     n = len(model.bodies)

@@ -41,7 +41,7 @@ def at_random_states(eq: Equations, n: int, *names: str) -> dict[str, np.ndarray
 
 
 def sufficient(eq: Equations) -> int:
-    """That Y_b pi_b = Y pi; returns the rank of Y, the independent count of base parameters."""
+    """Check that Y_b pi_b = Y pi; returns the rank of Y, the independent count of base parameters."""
     n = 4 + 24 * len(eq.quantity("frames")) // len(eq.symbols.speeds)
     found = at_random_states(eq, n, "regressor", "inertial_parameters", "base_regressor", "base_parameters")
     tau = np.einsum("nij,nj->ni", found["regressor"], found["inertial_parameters"])

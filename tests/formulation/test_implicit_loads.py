@@ -105,7 +105,7 @@ def test_the_normal_force_of_a_sliding_rod(angle, spin, friction):
 
 
 def solutions_of_rod(angle, spin, friction):
-    """How many normal forces there are, by the sign changes of the balance, which is linear on either side of zero."""
+    """Number of normal forces, by the sign changes of the balance, which is linear on either side of zero."""
     at_zero = balance_of_rod(0.0, angle, spin, friction)
     slopes = [balance_of_rod(1.0, angle, spin, friction) - at_zero, at_zero - balance_of_rod(-1.0, angle, spin, friction)]
     return int(-at_zero / slopes[0] > 0) + int(-at_zero / slopes[1] < 0)

@@ -26,8 +26,9 @@ def test_elimination_of_many_freedoms_is_not_derived() -> None:
 
 
 def test_the_least_of_operations_is_that_of_the_reduced_mass_matrix() -> None:
-    """Of n speeds: a row between each two, so that one is free and n - 1 squares are added; no rows and a full matrix, with
-    factors of n (n^2 - 1) / 6 products; one row over all, which ties the n - 1 others to each other, by one product each."""
+    """Operations for n speeds: a row between each two, so that one is free and n - 1 squares are added; no rows and a full
+    matrix, with factors of n (n^2 - 1) / 6 products; one row over all, which ties the n - 1 others to each other, by one product
+    each."""
     n = 6
     chain = np.eye(n - 1, n, dtype=bool) | np.eye(n - 1, n, 1, dtype=bool)
     assert least_operations(chain, np.eye(n, dtype=bool), [(k, k) for k in range(n - 1)]) == 2 * (n - 1) - 1

@@ -120,7 +120,7 @@ def test_generated_code_hands_over_where_the_dependent_speeds_lose_their_rows() 
 
 
 def _angle_that_aligns(module: Any, x: np.ndarray) -> float:
-    """How much q3 must change for the determinant of the eliminated columns to vanish."""
+    """Change of q3 at which the determinant of the eliminated columns vanishes."""
     from scipy.optimize import brentq
 
     def determinant(angle: float) -> float:

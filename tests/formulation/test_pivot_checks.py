@@ -36,7 +36,7 @@ def test_no_indefinite_mass_matrix_passes(backend: str) -> None:
 
 
 def test_a_check_of_a_value_with_a_sign() -> None:
-    """What is divided by is the value without its sign; the check stays with it."""
+    """The divisor is the value without its sign; the check stays with it."""
     recorder = Recorder()
     value = recorder.positive(-recorder.leaf("a", 1), "a is not negative")
     assert any(reason == "a is not negative" for reason in recorder.checks.values())

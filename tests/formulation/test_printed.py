@@ -1,4 +1,4 @@
-"""What is printed is what the generated code computes: see symdyn.lab.printed for the mechanisms."""
+"""Printed equations are those that the generated code computes: see symdyn.lab.printed for the mechanisms."""
 
 import dataclasses
 

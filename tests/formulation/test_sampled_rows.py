@@ -103,7 +103,8 @@ def test_minimum_degree_of_a_grid_fills_in_less_than_row_by_row() -> None:
 
 
 def test_pivots_follow_markowitz() -> None:
-    """Of admitted entries one of least (r - 1) (c - 1), the largest of these, whatever stands at places that are used up."""
+    """The pivot is an admitted entry of least (r - 1) (c - 1), the largest of these, whatever stands at indices that are used
+    up."""
     A = np.array([[2.0, 1.0, 0.0, 0.0], [1.0, 5.0, 1.0, 1.0], [0.0, 1.0, 0.1, 3.0]])
     order = elimination_order(A, A != 0)
     assert order is not None and order[0] == (0, 0)

@@ -1,4 +1,4 @@
-"""What stands for every GPU in the tests of devices."""
+"""Device that stands for every GPU in the tests of devices."""
 
 from __future__ import annotations
 

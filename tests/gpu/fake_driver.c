@@ -80,7 +80,7 @@ int cuLaunchKernel(void *function, unsigned x, unsigned y, unsigned z, unsigned 
     return n_launches++, OK;
 }
 
-// What is left: blocks, modules, streams; how many kernels ran.
+// Objects left: blocks, modules, streams; number of kernels that ran.
 void fake_counts(long long *counts) {
     counts[0] = n_blocks, counts[1] = n_modules, counts[2] = n_streams, counts[3] = n_launches;
 }

@@ -43,7 +43,7 @@ class Interface:
 
 
 class HostDevice:
-    """Memory are buffers of this process. What a stream is given is done when it is waited for, as late as a GPU may do it.
+    """Memory are buffers of this process. Work given to a stream is done when it is waited for, as late as a GPU may do it.
 
     memory    bytes that there are; threads: that are held at once; stack: bytes that each of them is said to take
     lent      arrays of others, which may be copied from
@@ -90,7 +90,7 @@ class HostDevice:
         return None
 
     def number_of(self, address: int) -> int:
-        """Of what was lent 0, of all else 1."""
+        """0 for lent memory, 1 for all else."""
         return int(not any(low <= address < high for low, high in map(np.lib.array_utils.byte_bounds, self.lent)))
 
     def upload(self, stream: list[Any], address: int, values: np.ndarray) -> None:
@@ -128,7 +128,7 @@ class HostDevice:
         self.log.append(("end", argument.n))
 
     def _inside(self, address: int, size: int) -> None:
-        """What is copied lies within one block."""
+        """Copied memory lies within one block."""
         assert any(start <= address and address + size <= start + ctypes.sizeof(block) for start, block in self.blocks.items())
 
 

@@ -40,7 +40,7 @@ def test_arrays_are_read_where_they_lie_and_states_stay_there(host: HostDevice, 
     p = module.parameters() * np.linspace(1, 1.2, N)[:, None]
     here = module.simulate_batch(x[:, :2], x[:, 2:], p, t=T)
     there = module.simulate_batch(lent(host, x[:, :2]), lent(host, x[:, 2:]), lent(host, p), t=T, device="gpu")
-    # What went up: times, tolerances, lengths, tables and counters, but no numbers of motions; no states came back.
+    # The uploads are times, tolerances, lengths, tables and counters, but no numbers of motions; no states came back.
     sizes = [size for what, size in host.log if what == "up"]
     assert max(sizes) < 1000 and len([what for what, _ in host.log if what == "begin"]) > 3
     assert N * 3 * 4 * 8 not in [size for what, size in host.log if what == "down"]

@@ -249,7 +249,7 @@ def test_implicit_methods_and_series(host: HostDevice, method: str) -> None:
 
 
 def test_factors_in_a_band(host: HostDevice) -> None:
-    """Of cables with dampers of different sizes; their tables are code of a GPU, too."""
+    """Factors of cables with dampers of different sizes; their tables are code of a GPU, too."""
     module = elastic_cable(10).embedding().compile(backend="c")
     asked = {"params": {"d": np.linspace(5.0, 30.0, 3)}, "t": [0, 0.005, 0.01], "method": "radau5"}
     there = module.simulate_batch(**asked, device="gpu")
@@ -540,7 +540,7 @@ def test_the_stack_of_a_kernel_is_bounded() -> None:
     printed = compiling.report(unit.source, "cart_pole", "sm_90")
     found = re.search(r"Used \d+ registers, .* (\d+) bytes cumulative stack size", printed)
     assert found is not None and 1000 < int(found[1]) < 10_000
-    # That which is printed of a thread is what PTX declares, but for what two blocks may share.
+    # The printed memory of a thread is what PTX declares, but for what two blocks may share.
     declared = sum(map(int, re.findall(rb"\.local \.align \d+ \.b8\s+\S+\[(\d+)\]",
                                        compiling.ptx(unit.source, "cart_pole", "compute_90")[0])))
     bytes_of_stack = gpu._resources(unit.source, "cart_pole")["bytes of stack"]

@@ -30,7 +30,7 @@ def verdicts(changed: Formula) -> list[Verdict]:
 
 
 def compared(name: str) -> Comparison:
-    """What sd.compare(name) gives; computed once in a run."""
+    """Result of sd.compare(name); computed once in a run."""
     return once(name, lambda: sd.compare(name))
 
 

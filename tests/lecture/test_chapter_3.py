@@ -19,7 +19,7 @@ LENGTH, G = 1.3, 9.81
 
 
 def largest_stretch(right: bool) -> float:
-    """How far the mass of the pendulum leaves the circle in 1 s, by the last row as printed or as derived."""
+    """Distance by which the mass of the pendulum leaves the circle in 1 s, by the last row as printed or as derived."""
     formula = next(f for f in compared("pendulum-augmented").formulas if f.name == "right side")
     last = (formula.derived if right else formula.printed)[2]
     names = ("x_P_dot", "y_P_dot")
@@ -67,7 +67,7 @@ def test_the_reaction_of_the_wire_is_right_at_rest_only() -> None:
 
 
 def test_the_reaction_of_a_slope_in_motion_works_in_the_actual_displacement_only() -> None:
-    """What the slides ask and leave open: is dr . F_c zero? At t = 0 the slope turns at 0.7 rad/s."""
+    """The slides ask and leave open: is dr . F_c zero? At t = 0 the slope turns at 0.7 rad/s."""
     angle = sp.Rational(2, 5) + sp.Rational(7, 10) * sd.t
     _, _, F_c, J, r_t = slope._particle(angle)
     values = {"q1": 2.0, "q1_dot": 0.3, "t": 0.0, "m": 1.5, "g": 9.81}

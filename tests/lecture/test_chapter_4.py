@@ -27,7 +27,7 @@ WRONG = {
 
 @pytest.mark.parametrize("module", WRONG)
 def test_errors_stand_where_they_are_known(module: str) -> None:
-    """That they are proven, and nothing else differs, is tested for all chapters together."""
+    """A test of all chapters together shows that they are proven, and that nothing else differs."""
     cases = importlib.import_module(f"symdyn.lecture.chapter_4_{module}").CASES
     formulas = [formula for case in cases for formula in case.taken()]
     assert sorted(f.slide.line for f in formulas if f.errata) == WRONG[module]

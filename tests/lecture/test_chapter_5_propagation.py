@@ -1,4 +1,4 @@
-"""What chapters 5.7 and 5.8 are compared with: the arms' letters against Newton's equations; which prints are found wrong."""
+"""References for chapters 5.7 and 5.8: the arms' letters against Newton's equations; which prints are found wrong."""
 
 from __future__ import annotations
 

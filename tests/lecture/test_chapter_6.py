@@ -91,7 +91,7 @@ def test_other_signs_are_found(case: str, name: str) -> None:
 
 @pytest.mark.parametrize("joint", [sd.Fixed, sd.Spherical])
 def test_three_equations_are_a_ball_joint(joint: type) -> None:
-    """What the slide prints for the fixed joint holds a ball joint as well; the fixed joint has three rows more."""
+    """The slide's equations for the fixed joint hold for a ball joint as well; the fixed joint has three rows more."""
     pair = chapter_6_constraints.Pair("P", "T", lambda P, T: joint("foot", P, T, parent_point=[1, 2, 3]))
     (rP, rT), RP = pair.r, pair.R[0]
     printed = (rP + RP * sp.Matrix([1, 2, 3]), rT)

@@ -17,7 +17,7 @@ AGAIN = "; look at the difference, and keep it with `pytest tests/lecture/test_l
 
 
 def sections(text):
-    """Of an errata page: the head, and what every case has in it, each erratum with its slip, and labels and words."""
+    """Sections of an errata page: the head, and what every case has in it, each erratum with its slip, and labels and words."""
     head, *parts = text.split("\n## ")
     found = {}
     for part in parts:

@@ -15,7 +15,8 @@ from symdyn.tape import Tape
 
 
 def evaluator_of(tape: Tape, inputs: Sequence[str], backend: str) -> Any:
-    """What evaluates the only output of a tape from its inputs, compiled by a backend; skips the test where C has no compiler."""
+    """Function that evaluates the only output of a tape from its inputs, compiled by a backend; skips the test where C has no
+    compiler."""
     (name,) = tape.outputs
     groups: dict[str, Sequence[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
     content = Content(name, "test", {name: tape}, {name: name}, {**groups, "inputs": inputs}, {}, {}, {})

@@ -1,4 +1,4 @@
-"""What the motion of a joint must be, from its R and d alone, by numerical differentiation with many digits."""
+"""Expected motion of a joint, from its R and d alone, by numerical differentiation with many digits."""
 
 from __future__ import annotations
 

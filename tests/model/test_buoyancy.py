@@ -161,7 +161,7 @@ def test_the_wrench_is_minus_the_gradient_of_the_potential() -> None:
 
 
 def test_first_and_second_derivatives_by_pose_and_parameters() -> None:
-    """Of all components at once along a line through pose and parameters, by differences with 60 digits."""
+    """Derivatives of all components at once along a line through pose and parameters, by differences with 60 digits."""
     L, rho = sd.parameters("L rho")
     site = Site.of(parameters=(L, rho))
     action = sd.Buoyancy("hull", [sd.Box((L, 4, 3), (0, L / 7, 0)), sd.Box((1, 1, L), (0, 5, 0))], rho).act(site)

@@ -181,7 +181,7 @@ def test_a_line_without_friction_has_a_potential(seabed: int, name: str, case: t
     touch = 1 - v if seabed and v < 1 else 0.0
 
     def height(s: float) -> float:
-        """Of the line over the anchor, by the closed form for the part below."""
+        """Height of the line over the anchor, by the closed form for the part below."""
         low, rise = max(v - 1, 0.0) if seabed else v - 1, v - (1 - s)
         return math.hypot(h, rise) - math.hypot(h, low) + e * (rise**2 - low**2) / 2 if s > touch else 0.0
 

@@ -1,4 +1,4 @@
-"""What a checked model prints, and how often a doubt is warned of."""
+"""Output of a checked model, and number of warnings of a doubt."""
 
 from __future__ import annotations
 

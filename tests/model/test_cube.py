@@ -1,4 +1,5 @@
-"""What water cuts off from the unit cube, against a closed formula at 80 digits, and against what any such cut obeys."""
+"""Part that water cuts off from the unit cube, against a closed formula at 80 digits, and against laws that any such cut
+obeys."""
 
 from __future__ import annotations
 
@@ -64,7 +65,7 @@ def full(packed: np.ndarray) -> list[np.ndarray]:
 
 
 def integral(context: Any, e: Sequence[Any]) -> Any:
-    """Of max(depth, 0) over the cube: the sum over its corners, for e1 e2 e3 != 0."""
+    """Integral of max(depth, 0) over the cube: the sum over its corners, for e1 e2 e3 != 0."""
     total = context.mpf(0)
     for signs in itertools.product((-1, 1), repeat=3):
         depth = e[0] + sum(s * v for s, v in zip(signs, e[1:], strict=True)) / 2

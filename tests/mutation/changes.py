@@ -1,6 +1,6 @@
 """Small changes of Python source that its tests should notice: operators, comparisons, conditions, constants, results.
 
-What no test of results sees is left out: texts, messages, annotations, decorators, assertions for type checkers.
+Code that no test of results sees is left out: texts, messages, annotations, decorators, assertions for type checkers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What mutation sampling changes."""
+"""Changes by mutation sampling."""
 
 from __future__ import annotations
 

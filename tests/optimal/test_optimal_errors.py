@@ -1,4 +1,5 @@
-"""What cannot be optimized: faults of a call, conditions that contradict each other, solvers that end early or are not there."""
+"""Problems that cannot be optimized: faults of a call, conditions that contradict each other, solvers that end early or are not
+there."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ F = sp.Symbol("F")
 # Kelly, SIAM Review 59 (2017), section 5; the pole is a point mass, and turns the other way round here.
 KELLY: dict[str, Any] = {"start": {"q1": 0, "q2": -np.pi}, "end": {"q1": 1, "q2": 0, "q1_dot": 0, "q2_dot": 0},
                          "bounds": {"F": (-20, 20), "q1": (-2, 2)}, "params": {"m_c": 1, "m_p": 0.3, "I_p": 0, "l": 0.5}}
-# Of an independent collocation with 320 intervals.
+# Cost by an independent collocation with 320 intervals.
 CONVERGED = 58.807667
 EFFORT = sd.Loss(integral=F**2)
 
@@ -216,7 +216,7 @@ def test_free_duration_of_equations_that_depend_on_the_time(transcription: str) 
 
 @functools.cache
 def bump(narrow: float, place: float) -> tuple[sp.Expr, float]:
-    """What a place costs, and the least cost of a motion over it in 1 s: by 2 x^(4) + g'(x) = 0, a boundary value problem."""
+    """Cost of a place, and the least cost of a motion over it in 1 s: by 2 x^(4) + g'(x) = 0, a boundary value problem."""
     x = sp.Symbol("x")
     cost = 10 * sp.exp(-sp.Float(narrow) * (x - sp.Float(place)) ** 2)
     g, slope = sp.lambdify(x, cost), sp.lambdify(x, cost.diff(x))

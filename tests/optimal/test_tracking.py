@@ -28,7 +28,7 @@ def slider(vertical: bool = False) -> sd.System:
 
 
 def test_a_double_integrator_against_its_closed_form() -> None:
-    """Whatever the motion is, S follows from the Hamiltonian's matrix exponential."""
+    """S follows from the Hamiltonian's matrix exponential, whatever the motion is."""
     A, B, Q, T = np.array([[0, 1.0], [0, 0]]), np.array([[0], [1.0]]), np.eye(2), 2.0
     motion = slider().compile(backend="c").simulate((0, T), inputs={"F": ([0, 0.3, 2], [0, 1, -1])})
     regulator = motion.lqr(Q=[1, 1], R=[1], Qf=[0, 0])

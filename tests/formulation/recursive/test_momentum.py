@@ -39,7 +39,7 @@ def carried_to_the_ground(tree: Tree, forces: Any) -> np.ndarray:
 
 
 def from_the_ground(here: Numbers, inverse: InverseDynamics) -> np.ndarray:
-    """What the ground exerts on the mechanism through the joints on it, about the n-origin."""
+    """Force and moment of the ground on the mechanism through the joints on it, about the n-origin."""
     rooted = [f if link.parent == GROUND else 0 * f for f, link in zip(inverse.f, here.tree.links, strict=True)]
     return carried_to_the_ground(here.tree, rooted)
 
