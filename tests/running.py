@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-# What most programs come to import; it takes a second and a half.
+# Modules that most programs come to import; it takes a second and a half.
 PRELOADED = ["symdyn.choice", "symdyn.pipeline", "symdyn.pictures", "symdyn.runtime.integrating.simulate", "symdyn.systems",
              "scipy.integrate", "scipy.optimize"]
 

@@ -153,7 +153,7 @@ def test_verdicts_are_in_order_and_colour(quick: None, tmp_path: Path, monkeypat
 def test_the_condition_is_that_of_the_mass_matrix() -> None:
     equations = sd.systems.get("double_pendulum").embedding()
     found = full_condition.along(SystemUnderTest(equations))
-    # Of a matrix of two rows with ones on its diagonal it is (1 + |r|) / (1 - |r|), r the other entry.
+    # For a matrix of two rows with ones on its diagonal it is (1 + |r|) / (1 - |r|), r the other entry.
     M = sd.systems.get("double_pendulum").embedding().lambdify("M_tilde")
     sol = found.solution
     matrices = np.array([M(q, u, sol.params) for q, u in zip(sol.q, sol.u, strict=True)])

@@ -1,4 +1,4 @@
-"""What notebooks show: equations of every mechanism, no wider than a page, and what stands on it is right."""
+"""Equations of every mechanism in notebooks are no wider than a page, and what stands on it is right."""
 
 import re
 
@@ -53,7 +53,7 @@ def test_equations_by_hand_have_pages():
 
 
 def test_the_recursion_is_that_of_the_equations():
-    """What a page prints, evaluated: S^T f of the recursion is M u_dot + k - F."""
+    """Printed formulas of a page, evaluated: S^T f of the recursion is M u_dot + k - F."""
     x = sd.coordinates("x y z psi theta phi")
     q = sd.coordinates("q")
     m, a = sd.parameters("m a")

@@ -1,4 +1,4 @@
-"""What a notebook shows of modules, motions, linear equations and ensembles: tables with the numbers that they have."""
+"""Views in a notebook of modules, motions, linear equations and ensembles: tables with the numbers that they have."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def test_other_threads_are_limited_by_themselves():
 
 
 def test_forms_do_not_depend_on_time():
-    """What is too large as a whole is written entry by entry, however little time SymPy's methods may take."""
+    """A quantity that is too large as a whole is written entry by entry, however little time SymPy's methods may take."""
     given = [replace(sd.systems.get("four_bar").augmented(), simplify_seconds=seconds) for seconds in (1e-9, 60.0)]
     equations = given[0]
     assert [e.explicit("k_tilde") for e in given] == [given[0].k_tilde] * 2

@@ -16,7 +16,7 @@ def uniform(seed: int, number: int = NUMBER) -> np.ndarray:
 
 
 def distances(rng: np.random.Generator, number: int) -> np.ndarray:
-    """Of either sign, from 1e-18 to 1e-8, a tenth of them zero."""
+    """Distances of either sign, from 1e-18 to 1e-8, a tenth of them zero."""
     sizes = 10 ** rng.uniform(-18, -8, number) * rng.choice([-1, 1], number)
     return np.where(rng.random(number) < 0.1, 0.0, sizes)
 

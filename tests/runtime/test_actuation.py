@@ -171,7 +171,7 @@ def test_no_accelerations_at_contradicting_constraints() -> None:
 
 
 def test_gaps_that_are_rounding_need_no_other_accelerations() -> None:
-    """Of two equal rows the rounding contradicts itself, which no accelerations fulfil; it is nothing by the size of terms."""
+    """The rounding of two equal rows contradicts itself, which no accelerations fulfil; it is nothing by the size of terms."""
     q, u, ud = MOTION
     x = np.array([*q, *u])
     found = smallest_acceleration(yoke(rows=2), 0.0, x, np.zeros(0), np.array(ud), np.array([1e-16, -2e-16]))
@@ -194,7 +194,7 @@ def test_rounding_of_absolute_coordinates_is_no_contradiction(backend: str) -> N
     q, u = module.consistent()
     ud = module.rhs(0.0, [*q, *u], inputs={F1: 1, F2: 3, F3: 2})[len(q):]
     found = module.actuation(0.0, q, u, ud, project=True).inputs.to_dict()
-    # Of all with F1 + F3 / 2 = 2 the least.
+    # The least forces of all with F1 + F3 / 2 = 2.
     assert found == pytest.approx({"F1": 1.6, "F2": 3.0, "F3": 0.8}, rel=1e-9)
 
 

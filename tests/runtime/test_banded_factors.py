@@ -146,7 +146,7 @@ def test_events_states_between_steps_and_motions_backwards(cable: Any) -> None:
     np.testing.assert_allclose(found.events["low"].t, exact.events["low"].t, rtol=0, atol=1e-8)
     between = np.linspace(0.001, 0.049, 17)
     assert np.abs(found(between) - exact(between))[:, :98].max() <= 1e-7
-    # What is damped grows backwards: a short way.
+    # Damped motions grow backwards: a short way.
     start = exact.x[-1]
     back = [cable.simulate([0.05, 0.0498], start[:98], start[98:], events=False, **{**given, **more}).q[-1]
             for more in ({"method": "dop853", **TIGHT}, {})]

@@ -231,7 +231,7 @@ def projected(name: str) -> Any:
 
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank", *swept(["rolling_disc", "stewart_platform"]), "tops"])
 def test_motions_that_are_projected_take_the_steps_of_one(name: str) -> None:
-    """Of the slider-crank rejected steps, too, and states of its own parameters."""
+    """The slider-crank has rejected steps, too, and states of its own parameters."""
     module = projected(name)
     metadata, rng = module.metadata, np.random.default_rng(1)
     q, u = module.consistent()

@@ -206,7 +206,7 @@ def test_killed_half_way(
     slow.unlink()
     assert value(load(KERNEL, "m", compiler)) == EXPECTED
 
-    # What was left is removed a day later, by the first build of a process; a folder in use is not.
+    # Leftovers are removed a day later, by the first build of a process; a folder in use is not.
     cache._sweep.cache_clear()
     os.utime(folder / left, (time.time() - 2 * 86400,) * 2)
     (folder / "build-in-use").mkdir()
@@ -339,7 +339,7 @@ def test_threads_that_write_the_same_module(folder: Path) -> None:
 
 
 def test_threads_that_write_the_same_files_leave_no_half(tmp_path: Path) -> None:
-    """Whoever reads a written module meanwhile reads a whole one, and can import it."""
+    """A reader of a written module meanwhile reads a whole one, and can import it."""
     module = sd.systems.get("pendulum").embedding().compile(backend="numpy")
     (path,) = module.write(tmp_path)
     whole, start = path.read_text(encoding="utf-8"), threading.Barrier(8)

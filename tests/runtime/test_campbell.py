@@ -82,7 +82,7 @@ def coleman(W: float, d: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def upper(values: np.ndarray) -> np.ndarray:
-    """Of each pair the eigenvalue with positive imaginary part, by frequency."""
+    """Eigenvalues with positive imaginary part of each pair, by frequency."""
     kept = values[values.imag > 1e-9]
     return kept[np.argsort(kept.imag)]
 

@@ -242,7 +242,7 @@ def test_auto_reports_that_series_do_not_fit() -> None:
 
 
 def test_spectral_radius(oil: dict[str, Any]) -> None:
-    """That of x_dot at q = pi/2, where gravity adds nothing to the eigenvalues 0 and -d."""
+    """The spectral radius is that of x_dot at q = pi/2, where gravity adds nothing to the eigenvalues 0 and -d."""
     x = np.array([np.pi / 2, 0.0])
     module = oil["numpy"]
     request = Request((0, 1), None, x, module.parameters(), Inputs(np.zeros(0)), 1e-6, x, 0.0, 0.0, None, 2)

@@ -1,4 +1,4 @@
-"""Which compiler is found, in which order, and what is said when there is none."""
+"""Search for a compiler: its order, and the message when there is none."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def test_contacts_on_the_border_of_two_modes_are_named() -> None:
 
 
 def test_painleves_rod_has_none_or_two_for_lemke_too() -> None:
-    """Of a matrix that is not copositive a ray is reached where there is no solution, and both of two are found."""
+    """A ray of a matrix that is not copositive is reached where there is no solution, and both of two are found."""
     D = np.array([[1.0, -1.5], [-1.5, 3.0]])
     slides = [Site((0, 1), 1.0, 1.0, slip=np.array([-1.0]))]
     assert not contact_laws._by_lemke(D, np.array([-1.0, 0.0]), slides)

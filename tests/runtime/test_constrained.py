@@ -267,7 +267,7 @@ def test_baumgarte_reports_when_it_loses_them(method: str) -> None:
 
 
 def test_steps_as_asked_and_on() -> None:
-    """What is kept of a run that was stopped is on the manifold, too."""
+    """States kept of a run that was stopped are on the manifold, too."""
     with pytest.warns(SimulationWarning, match="20 steps were done"):
         solution = module("four_bar").simulate((0, 10), max_steps=20, rtol=1e-8)
     assert max(worst(solution)) < 1e-11 and solution.n_steps == 20

@@ -77,7 +77,7 @@ def test_a_linearization_is_copied(way: Callable[[object], object]) -> None:
 
 
 def run(module: sd.System, angle: float) -> Solution:
-    """What a task does: a whole solution comes back."""
+    """A task returns a whole solution."""
     return module.simulate((0, 0.2), q={"q1": angle})  # type: ignore[attr-defined, no-any-return]
 
 

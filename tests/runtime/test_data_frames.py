@@ -14,7 +14,7 @@ from symdyn.runtime.solutions.solution import Solution
 
 
 def motion() -> Solution:
-    """Of a pendulum with a point and a number as outputs."""
+    """Motion of a pendulum with a point and a number as outputs."""
     system = sd.systems.pendulum()
     body = system.bodies[0]
     system.add_output("tip", sd.position(body))

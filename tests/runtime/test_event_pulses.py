@@ -214,7 +214,7 @@ def test_ordinary_events_are_proved_without_a_warning(name: str) -> None:
 
 @pytest.mark.parametrize("backend", swept(["c", "numpy"], "c"))
 def test_random_pulses_are_found_without_a_warning(backend: str) -> None:
-    """Of widths down to a millionth of the span, as in symdyn.lab.events."""
+    """Pulses of widths down to a millionth of the span, as in symdyn.lab.events."""
     module = system().embedding().compile(backend=backend)
     method = "dop853" if backend == "c" else "DOP853"
     for seed in range(3 if backend == "c" else 1):

@@ -1,4 +1,4 @@
-"""Which zeros are found within long steps and at the start, against closed forms, by every method."""
+"""Zeros found within long steps and at the start, against closed forms, by every method."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def test_a_threshold_that_is_hardly_reached_is_passed_once_each_way(backend: str
 
 
 def test_zeros_of_the_sweep_are_zeros() -> None:
-    """Of the polynomials and the touching sine by their values next to the zeros."""
+    """Zeros of the polynomials and the touching sine by their values next to them."""
     for seed in range(4):
         drawn = draw(seed, TOLERANCES[0])
         p = drawn.params

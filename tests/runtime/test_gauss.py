@@ -96,7 +96,7 @@ def test_the_chosen_step_follows_the_tolerance(double: Any) -> None:
 
 @pytest.mark.parametrize("given", [{"first_step": 0.02}, {"rtol": 1e-12}])
 def test_forward_and_back(double: Any, given: dict[str, float]) -> None:
-    """Of equal steps nothing is left but rounding, of chosen ones the tolerance."""
+    """Equal steps leave nothing but rounding, chosen ones the tolerance."""
     q = np.array([-1.2, 0.3])
     there = double.simulate([0.0, 100.0], q, **GAUSS, **given)
     back = double.simulate([100.0, 0.0], there.q[-1], there.u[-1], **GAUSS, **given)
@@ -153,7 +153,7 @@ def test_a_step_whose_sweeps_find_no_end_is_taken_in_parts(pendulum: Any) -> Non
 
 
 def test_steps_that_were_divided_are_counted(double: Any) -> None:
-    """Of 100 equal steps some become two or more; with every step stored it is seen which."""
+    """Some of 100 equal steps become two or more; every step stored shows which."""
     for h, t in ((0.1, (0.0, 10.0)), (0.25, (0.0, 10.0)), (0.25, np.array([0.0, 10.0]))):
         with pytest.warns(SimulationWarning) as caught:
             found = double.simulate(t, **GAUSS, first_step=h, steps=True)

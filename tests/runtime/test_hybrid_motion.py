@@ -29,7 +29,7 @@ def hybrid_in_c() -> ctypes.CDLL:
 
 
 def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str], np.ndarray, np.ndarray]:
-    """What C finds, and modes, forces and accelerations."""
+    """Result of C, and modes, forces and accelerations."""
     n, rows = len(sites), np.array([0 if site.bounded else len(site.rows) for site in sites], dtype=np.intc)
     excluded = np.array([sum(1 << hybrid.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
     coefficients = np.array([[s.static, s.kinetic, 0.0 if s.slip is None or not len(s.slip) else s.slip[0]] for s in sites])

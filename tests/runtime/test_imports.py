@@ -1,4 +1,4 @@
-"""What is imported when: nothing heavy by `import symdyn`, no SymPy by generated code and what runs it."""
+"""Time of imports: nothing heavy by `import symdyn`, no SymPy by generated code and what runs it."""
 
 from __future__ import annotations
 

@@ -221,7 +221,7 @@ def test_both_backends_and_the_parts_by_themselves(compiled: Any) -> None:
 
 
 def test_written_functions_keep_their_reference_vectors(tmp_path: Any) -> None:
-    """Of the balance and all its derivatives, against the tape at 30 digits; names of directions are no identifiers."""
+    """Vectors of the balance and all its derivatives, against the tape at 30 digits; names of directions are no identifiers."""
     x, theta = sd.coordinates("x theta")
     k = sd.parameters("k", positive=True)
     s = sd.System("written_crab", gravity=[0, -9.81, 0])

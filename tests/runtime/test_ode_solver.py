@@ -21,7 +21,7 @@ K, W = np.sin(0.5), np.sqrt(9.81)
 
 
 def angle(t: Any) -> Any:
-    """Of a pendulum of 1 m that is released at 1 rad (Jacobi's elliptic functions)."""
+    """Angle of a pendulum of 1 m that is released at 1 rad (Jacobi's elliptic functions)."""
     return 2 * np.arcsin(K * ellipj(ellipk(K**2) - W * t, K**2)[0])
 
 

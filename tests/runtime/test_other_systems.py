@@ -1,4 +1,4 @@
-"""What Python does differently on Windows and macOS, through the places where symdyn asks which system it is on."""
+"""Differences of Python on Windows and macOS, through the places where symdyn asks which system it is on."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ sys.exit(main(["list"]))
 
 
 def test_no_file_is_read_or_written_in_the_encoding_of_the_system(tmp_path: Path) -> None:
-    """On Windows that is not UTF-8. What a compiler prints is in the system's, and is taken so."""
+    """On Windows that is not UTF-8. The output of a compiler is in the system's encoding, and is taken so."""
     allowed = [f"-Wignore::EncodingWarning:symdyn.runtime.{name}" for name in ("compiler", "objects")]
     done = subprocess.run([sys.executable, "-X", "warn_default_encoding", "-W", "error::EncodingWarning", *allowed, "-c", ENCODED,
                            str(tmp_path / "written")], capture_output=True, text=True, cwd=tmp_path,

@@ -128,7 +128,7 @@ def test_curves_are_the_solution() -> None:
 
 
 def test_many_curves_are_divided_by_joints() -> None:
-    """Of 24 coordinates each set of axes has as many as its legend can name in colours of their own."""
+    """Each set of axes has as many of 24 coordinates as its legend can name in colours of their own."""
     figure = plot(motion("n_link_pendulum", (0.0, 0.01), n=24))
     curves = [axes for axes in figure.axes if axes.get_ylabel() == "coordinates [rad]"]
     assert [axes.get_title(loc="left") for axes in curves] == [f"hinge{k} \N{EN DASH} hinge{k + 7}" for k in (1, 9, 17)]
@@ -394,7 +394,7 @@ def ends_of(solution: Solution, joint: str) -> tuple[tuple[str, np.ndarray], tup
 
 
 def missed(points: np.ndarray, wanted: np.ndarray) -> float:
-    """How far the nearest of the points (n_t, n, 2 or 3) is from what is wanted, (n_t, 2 or 3)."""
+    """Distance of the nearest of the points (n_t, n, 2 or 3) from the wanted ones, (n_t, 2 or 3)."""
     return float(np.nanmin(np.abs(points - wanted[:, None]).max(axis=(0, 2))))
 
 

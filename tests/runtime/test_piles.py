@@ -35,7 +35,7 @@ AT = np.array([[0, HEIGHT * (k + 0.5), 0] for k in range(N)]).ravel()
 
 
 def level(solution: sd.Solution, k: int, what: str) -> np.ndarray:
-    """Of both corners of a block: forces or impulses (normal, tangential) at the last time."""
+    """Values at both corners of a block: forces or impulses (normal, tangential) at the last time."""
     return sum(getattr(solution.contacts[f"{side}_{k}"], what)[-1] for side in ("left", "right"))
 
 

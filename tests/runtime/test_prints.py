@@ -1,4 +1,4 @@
-"""What objects print: singular and plural, units, closures that would go unmentioned, rounding that is no value."""
+"""Printed objects: singular and plural, units, closures that would go unmentioned, rounding that is no value."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ def test_extremes_are_those_of_the_motion(report: Path, solution: Solution) -> N
 
 
 def test_means_do_not_depend_on_where_the_steps_are(module: Module) -> None:
-    """Of F = 2 sin t over its period the mean is 0 and the deviation sqrt 2, however the times lie."""
+    """F = 2 sin t over its period has the mean 0 and the deviation sqrt 2, however the times lie."""
     t = 2 * np.pi * np.linspace(0, 1, 4001)**3
     solution = module.simulate(t, inputs={"F": lambda t, x: 2 * np.sin(t)}, rtol=1e-3)
     (row,) = [r for r in run_tables.extremes(solution) if r["name"] == "F"]

@@ -252,7 +252,7 @@ def test_a_table_and_a_function_run_with_a_controller(backend: str, method: str)
         return 3 * t if t <= 1 / 3 else 1.5 * (1 - t)
 
     held = sd.Sampled(lambda t, x: 2.0 - t, 0.25, delay=0.05)
-    # What F gives: 2, 1.75, 1.5, 1.25 N, each for a quarter of a second from 0.05 s on, cut at 1 s.
+    # Integral of F, which is 2, 1.75, 1.5, 1.25 N, each for a quarter of a second from 0.05 s on, cut at 1 s.
     speed = (0.25 * (2 + 1.75 + 1.5 + 1.25) - 0.05 * 1.25 + 0.5) / MASS
     for D in (([0, 1 / 3, 1], [0, 1, 0]), triangle):
         sol = cart(backend).simulate((0, 1), inputs={"F": held, "D": D}, method=method, rtol=1e-9)

@@ -78,7 +78,7 @@ def parts(shape: Any) -> list[Part]:
 
 
 def volume(pieces: list[Part]) -> float:
-    """What the drawn faces enclose, by the divergence theorem: a third of the sum of p . n A."""
+    """Volume that the drawn faces enclose, by the divergence theorem: a third of the sum of p . n A."""
     total = 0.0
     for part in pieces:
         for face in part.faces:
@@ -211,7 +211,7 @@ def test_flexible_bodies_bend_and_end_at_their_tips(shown: bool) -> None:
 
 
 def hit(part: Part, places: np.ndarray, eye: np.ndarray, way: np.ndarray) -> float:
-    """How far along a ray it enters a convex piece; infinite if it misses."""
+    """Distance along a ray at which it enters a convex piece; infinite if it misses."""
     normals, offsets = planes(places, np.concatenate([part.corners, part.hidden]))
     speed, ahead = normals @ way, offsets - normals @ eye
     with np.errstate(divide="ignore"):

@@ -62,7 +62,7 @@ def test_sliding_along_a_jump_that_moves_is_chattering(pushed: Any) -> None:
 
 
 def test_relative_motion_under_constraints_chatters() -> None:
-    """Of two blocks one upon the other, in absolute coordinates."""
+    """Motion of two blocks one upon the other, in absolute coordinates."""
     x, y, F = *sd.coordinates("x y"), sd.inputs("F")
     s = sd.System("pile", gravity=[0, 0])
     low, high = s.add_body("low", mass=2), s.add_body("high", mass=1)

@@ -255,7 +255,7 @@ def test_what_an_input_function_raises_ends_the_motion(oscillator: Any, error: t
                         rf"in line {line} of test_simulate\.py; the state there: q = \S+, q_dot = \S+, z = \S+", solution.message)
     assert float(re.search(r"t = ([\d.]+)", solution.message).group(1)) > 0.5  # type: ignore[union-attr]
     assert type(solution.cause) is error and str(solution.cause) == "mine"
-    # What came before is there, the inputs with it.
+    # The motion before is there, the inputs with it.
     assert len(solution.t) > 1 and 0 < solution.t[-1] <= 0.5 and np.isfinite(solution.x).all()
     assert np.isfinite(solution.inputs).all() and np.isfinite(solution.energy).all()
 

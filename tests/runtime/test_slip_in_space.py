@@ -1,4 +1,4 @@
-"""How contacts in space begin to slip and come to stick, with friction whose direction turns."""
+"""Contacts in space that begin to slip and come to stick, with friction whose direction turns."""
 
 from functools import cache
 from typing import Any

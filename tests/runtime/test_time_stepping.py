@@ -180,7 +180,8 @@ def test_static_friction_holds_more_than_kinetic_friction() -> None:
 
 
 def test_a_box_that_is_pushed_on_two_corners_begins_to_slide_when_both_are_at_their_bound() -> None:
-    """How the corners share friction is open: one may be at its bound of static friction while the other still holds the box."""
+    """The shares of the corners in friction are open: one may be at its bound of static friction while the other still holds the
+    box."""
     m, static, kinetic, g, rate, end = 2.0, 0.5, 0.4, 9.81, 3.0, 6.0
     system = sd.System("pushed", gravity=[0, -g])
     body = system.add_body("box", mass=m, inertia=0.1)

@@ -22,8 +22,8 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler h
 
 SLEEVE, SLEEVE_J, BIRD, BIRD_J, SPRING, G, MU = 3e-4, 5e-9, 4.5e-3, 7e-7, 0.0056, 9.81, 0.3
 POLE_R, SLEEVE_R, HALF, ARM, REACH, BEAK_H, BEAK = 0.0025, 0.0031, 0.0058, 0.010, 0.015, 0.02, 0.0201
-# Of the beak, the lower and the upper edge of the sleeve: gap at zero angles, its derivative by [y, sleeve, bird], that of the
-# way along the pole, restitution.
+# Data of the beak, the lower and the upper edge of the sleeve: gap at zero angles, its derivative by [y, sleeve, bird], that of
+# the way along the pole, restitution.
 EDGES = {"beak": (ARM + REACH - BEAK - POLE_R, [0, 0, -BEAK_H], [1, ARM, REACH - BEAK], 0.5),
          "low": (SLEEVE_R - POLE_R, [0, HALF, 0], [1, SLEEVE_R, 0], 0.0),
          "up": (SLEEVE_R - POLE_R, [0, -HALF, 0], [1, SLEEVE_R, 0], 0.0)}
@@ -31,7 +31,8 @@ EDGES = {"beak": (ARM + REACH - BEAK - POLE_R, [0, 0, -BEAK_H], [1, ARM, REACH -
 
 @cache
 def woodpecker() -> Any:
-    """That of the catalogue, in which points without mass on slides follow the edges; what does not touch is linear."""
+    """The woodpecker of the catalogue, in which points without mass on slides follow the edges; motion without contact is
+    linear."""
     return sd.systems.woodpecker_toy().compile()
 
 
