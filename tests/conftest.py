@@ -64,7 +64,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_unconfigure() -> None:
-    """What is left at the end need not be looked through for garbage, which pytest and Python do several times."""
+    """Objects left at the end need not be looked through for garbage, which pytest and Python do several times."""
     gc.freeze()
 
 
@@ -144,7 +144,7 @@ share_with_notebooks()
 
 
 def prepare_notebooks(folder: Path) -> None:
-    """What notebooks begin with: as here, garbage is looked for seldom, and cases of the lecture are compared once in a run."""
+    """First cell of notebooks: as here, garbage is looked for seldom, and cases of the lecture are compared once in a run."""
     startup = folder / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = NOTEBOOK_STARTUP.format(threshold=GC_THRESHOLD, folder=str(Path(__file__).parent / "lecture"))

@@ -56,7 +56,7 @@ def run(*arguments: str, before: str = "", after: str = "", **environment: str) 
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
-    """What is said when a command fails; never a traceback of symdyn."""
+    """Message of a command that fails; never a traceback of symdyn."""
     try:
         assert main(arguments) == code
     except SystemExit as stop:  # argparse's own refusals

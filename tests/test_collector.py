@@ -60,7 +60,7 @@ def what_stays_is_not_looked_through_again() -> None:
 
 
 def garbage_of_many_pauses_is_found() -> None:
-    """What is set aside without having been looked through has a limit; searches through all begin to count again."""
+    """The garbage set aside without having been looked through has a limit; searches through all begin to count again."""
     aside = []
     for _ in range(5):
         with collector_paused():

@@ -1,4 +1,4 @@
-"""What the pages under docs show is what happens."""
+"""Code on the pages under docs runs as shown."""
 
 import ast
 import json

@@ -29,7 +29,7 @@ LEFT_OUT = {"Convention.faults", "Equations.validity_checks", "Fit.of", "Module.
 
 
 class Entry(NamedTuple):
-    """What a line of the reference's pages asks autodoc for: its kind, what it is about, and its options."""
+    """Request of a line of the reference's pages to autodoc: its kind, what it is about, and its options."""
 
     kind: str
     path: str
@@ -102,7 +102,8 @@ PUBLIC = {name: thing for name, thing in documented() if not _raised(thing) or "
 
 
 def test_the_reference_has_every_public_name() -> None:
-    """Of the package, and of the classes whose members it lists; so that what has an example here is all that users call."""
+    """The names are those of the package and of the classes whose members it lists; so that what has an example here is all that
+    users call."""
     things = [id(resolved(name)) for name, _ in documented()]
     named = {name: getattr(sd, name) for name in sd.__all__}
     assert [name for name, thing in named.items() if _behaves(thing) and id(thing) not in things] == []

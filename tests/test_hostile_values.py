@@ -1,4 +1,5 @@
-"""What is no real number, no name and no flag, and what no memory holds, is an error of symdyn wherever values come in."""
+"""Values that are no real number, no name and no flag, and those that no memory holds, are errors of symdyn wherever they come
+in."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def test_notebook_holds_no_outputs(source: Path) -> None:
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
 def test_kept_results_belong_to_the_code(source: Path) -> None:
-    """What the pages show below the code was shown by that code, and every picture and view that they name is there."""
+    """Results below the code on the pages were shown by that code, and every picture and view that they name is there."""
     kept = json.loads((FOLDER / "results" / f"{source.stem}.json").read_text(encoding="utf-8"))
     cells = [cell.source for cell in jupytext.read(source).cells if cell.cell_type == "code"]
     codes = [hashlib.sha256(code.encode()).hexdigest()[:16] for code in cells]

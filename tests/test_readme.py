@@ -1,4 +1,4 @@
-"""What the README shows is what happens."""
+"""Code in the README runs as shown."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What a release says of itself in several places agrees."""
+"""Statements of a release about itself in several places agree."""
 
 from __future__ import annotations
 

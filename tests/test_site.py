@@ -34,7 +34,7 @@ KINDS = "index", "tutorials/wheel_on_a_road", "measured", "gallery", "gallery/pu
 pytestmark = pytest.mark.slow
 
 
-# Of these the gallery has pages: trees, loops, a rolling contact, what floats, what touches. All others are in the sweep.
+# The gallery has pages of these: trees, loops, a rolling contact, what floats, what touches. All others are in the sweep.
 SOME = ["floating_crane", "four_bar", "pendulum", "puma560", "rocking_block", "rolling_disc"]
 
 
@@ -261,7 +261,7 @@ def test_tutorials_are_pages_with_what_their_code_shows(site: Path) -> None:
 @pytest.mark.parametrize(("name", "views"), swept([("a_walker", 1), ("robot_arm_from_urdf", 2), ("turbine_campbell_diagram", 1),
                                                    ("wheel_on_a_road", 1)], ("wheel_on_a_road", 1)))
 def test_views_of_tutorials_are_drawn(site: Path, chromium: Any, name: str, views: int) -> None:
-    """What a notebook showed as a page that turns is drawn on the tutorial's page, without a word on the console."""
+    """A page that turns in a notebook is drawn on the tutorial's page, without a message on the console."""
     page = chromium.new_page()
     said: list[str] = []
     page.on("console", lambda message: said.append(message.text))

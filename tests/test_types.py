@@ -1,4 +1,4 @@
-"""What editors and type checkers see of the public names."""
+"""Types of the public names in editors and type checkers."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ module = equations.compile(backend="numpy")
 solution = module.simulate((0, 1), q={"x": 0.1}, inputs={"F": 1.0})
 linear = module.linearize(module.equilibrium(), hold=None)
 """
-# Of all that symdyn can work with, only NumPy's types are in what is revealed.
+# Only NumPy's types, of all that symdyn can work with, are in the revealed ones.
 SETTINGS = """[mypy]
 follow_imports = skip
 ignore_missing_imports = True

@@ -102,7 +102,7 @@ def test_commands_of_the_readme_in_an_unpacked_sdist(unpacked: Path) -> None:
 
 
 def required(path: Path) -> dict[str, importlib.metadata.Distribution]:
-    """What a wheel says that it needs, and what that needs, without extras; each must be here in a version that will do."""
+    """Requirements of a wheel, and theirs, without extras; each must be here in a version that will do."""
     with zipfile.ZipFile(path) as archive:
         (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         wanted = importlib.metadata.PathDistribution(zipfile.Path(archive, name.removesuffix("METADATA"))).requires or []

@@ -30,7 +30,7 @@ def c_text(name: str, *results: str) -> str:
             f"    (void)k;\n{lines}\n    return 0;\n}}\n")
 
 
-# Of second, first and no derivatives; the last two stand in one text.
+# Functions with second, first and no derivatives; the last two stand in one text.
 CURVES = sd.External("curves", ["x", "k"], 8, python=curves_numpy, c=c_text(
     "curves", "-6*k*x", "-(1 + 3*x*x)", "-(1 + 3*x*x)", "0*x", "k*(1 + 3*x*x)", "x*(1 + x*x)", "x*(1 + x*x)", "0*x"))
 SHARED = c_text("slopes", "-k*(1 + 3*x*x)", "-x*(1 + x*x)", "k*x*(1 + x*x)", "x*x*(1 + x*x/2)/2") + "\n" + c_text(

@@ -1,7 +1,7 @@
 """Steady and periodic motions whose linear equations change along them, against closed forms in the fixed frame.
 
-Eigenvalues of a matrix that is frozen at one instant decide nothing here. What is compared are exponents and multipliers over a
-period, with the frequency in the fixed frame.
+Eigenvalues of a matrix that is frozen at one instant decide nothing here. The compared numbers are exponents and multipliers over
+a period, with the frequency in the fixed frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tests.helpers import swept
 
 
 def upper(values: Any, level: float = 1e-6) -> np.ndarray:
-    """Of each pair the one with positive imaginary part, by frequency."""
+    """Eigenvalues with positive imaginary part of each pair, by frequency."""
     kept = np.asarray(values)[np.asarray(values).imag > level]
     return kept[np.argsort(kept.imag)]
 
@@ -97,7 +97,7 @@ def test_the_closed_form_of_the_rotor_gives_the_known_frequencies() -> None:
 @pytest.mark.parametrize("W", [60.0, -60.0, 7.0])
 @pytest.mark.parametrize("attitude", ["parameters", "angles", "rates", "first"])
 def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude: str, W: float) -> None:
-    """Whatever its coordinates are; nothing is damped, so that it is neutral."""
+    """Its coordinates do not matter; nothing is damped, so that it is neutral."""
     found = free_rotor(attitude).stability(fixed={SPEED[attitude]: W})
     assert_alike(upper(found.exponents).imag, np.abs(isotropic(W)))
     assert np.abs(np.real(found.exponents)).max() < 1e-7 and found.verdict == "neutral"

@@ -16,8 +16,8 @@ import symdyn as sd
 from symdyn.errors import ArgumentError, NoEquilibrium
 from tests.helpers import swept
 
-# Of van der Pol's oscillator with mu = 1. Source: Amore, Boyd and Fernandez, High order analysis of the limit cycle of the van
-# der Pol oscillator, J. Math. Phys. 59 (2018).
+# Period of van der Pol's oscillator with mu = 1. Source: Amore, Boyd and Fernandez, High order analysis of the limit cycle of the
+# van der Pol oscillator, J. Math. Phys. 59 (2018).
 PERIOD, AMPLITUDE = 6.6632868593231301896996820305, 2.00861986087484313650940188
 
 

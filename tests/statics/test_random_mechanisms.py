@@ -16,7 +16,7 @@ from tests.helpers import swept
 
 # With these every topology, motion, feature and formulation occurs; 39 is compiled to C. More of them are in the sweep.
 NUMBERS = [0, 1, 3, 5, 6, 7, 10, 12, 14, 16, 18, 20, 21, 23, 39]
-# Of these verdicts are compared besides.
+# Verdicts on these are compared besides.
 JUDGED = (0, 6, 12)
 
 
@@ -38,7 +38,7 @@ def test_all_kinds_are_dealt_out() -> None:
 
 
 def eigenvalues(system: sd.System, x: dict[str, float], speeds: tuple[int, ...], t: float = 0.0) -> np.ndarray:
-    """Of the derivative of the flow at a state, in all displacements and these speeds, sorted."""
+    """Eigenvalues of the derivative of the flow at a state, in all displacements and these speeds, sorted."""
     equations = system.augmented() if system.constraints else system.embedding()
     module = equations.compile(backend="numpy")
     state = np.array([x.get(name, 0.0) for name in module.metadata.x])
@@ -73,7 +73,7 @@ def test_slot_that_turns_about_a_bead_at_rest() -> None:
     s.add_joint(sd.Prismatic("along", s.ground, rail, x, axis=[1, 0]))
     s.add_joint(sd.Prismatic("across", rail, bead, y, axis=[0, 1]))
     s.add_constraint(y * sp.cos(3 * sd.t) - x * sp.sin(3 * sd.t))
-    # Of x alone, at 0.2 s: x = r cos(3 t), so that x_dot changes with x at fixed r_dot.
+    # Derivative by x alone, at 0.2 s: x = r cos(3 t), so that x_dot changes with x at fixed r_dot.
     found = eigenvalues(s, {}, (0,), t=0.2)
     slope = np.tan(0.6)
     assert np.isclose(found.sum(), -6 * slope, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""What a user requests and reads: guesses of a trim, the verdict of a linearization, held dead points, gimbal lock."""
+"""Requests and results of a user: guesses of a trim, the verdict of a linearization, held dead points, gimbal lock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is a state of rest and of the mechanism, what is rounding, what is held, and which words name it: minimal cases."""
+"""States of rest and of the mechanism, rounding, held coordinates, and the words that name them: minimal cases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PRINTED_OR_RAISED = (ArgumentError, EquilibriumNotUnique, NoEquilibrium)
 
 
 def printed(call: Any) -> str:
-    """What a call prints, or the message of its error."""
+    """Output of a call, or the message of its error."""
     try:
         return repr(call())
     except PRINTED_OR_RAISED as error:
@@ -219,7 +219,7 @@ FOLDED = {"theta": math.pi / 2, "phi": -math.pi, "theta_dot": 0.0, "phi_dot": 0.
 def test_a_slider_crank_that_is_folded_is_a_singular_configuration(scale: float) -> None:
     """From its own initial values the search ends where one rod lies on the other: C_r is 5e-16, its rank 0.
 
-    Two motions lead away from there. Whatever is printed names it, and no frequency that depends on the masses.
+    Two motions lead away from there. Every output names it, and no frequency that depends on the masses.
     """
     module = systems.slider_crank().augmented().compile(backend="numpy")
     params = {"m": scale}

@@ -1,4 +1,4 @@
-"""Which way modes go round: translation and tilt in one sense, and in opposite ones, against eigenvectors by hand."""
+"""Sense in which modes go round: translation and tilt in one sense, and in opposite ones, against eigenvectors by hand."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.statics.test_frozen_time import free_rotor
 
 MASS, ACROSS, ALONG = 1.0, 0.25, 0.4
 STIFFNESS = {"x": 400.0, "y": 900.0, "a": 60.0, "b": 30.0}
-# Of x with the tilt b about y, and of y with the tilt a about x.
+# Coupling of x with the tilt b about y, and of y with the tilt a about x.
 COUPLING = (-30.0, -50.0)
 
 
@@ -52,7 +52,7 @@ def by_hand(W: float) -> list[tuple[float, float, float]]:
     values, vectors = np.linalg.eig(np.block([[np.zeros((4, 4)), np.eye(4)], [-inverse @ K, -inverse @ G]]))
 
     def round_about(p: complex, q: complex, bodies: int) -> float:
-        """Of so many bodies that both move; one more moves along p alone."""
+        """Modes of so many bodies that both move; one more moves along p alone."""
         return float(-2 * bodies * np.imag(np.conj(p) * q) / ((bodies + 1) * abs(p)**2 + bodies * abs(q)**2))
 
     return [(float(values[k].imag), round_about(*vectors[:2, k], 3), round_about(*vectors[2:4, k], 1))

@@ -59,7 +59,7 @@ def source(crank: SystemUnderTest) -> Any:
 
 
 def found(measured: dict[str, rounding.Measured], source: Any, old: str = "", new: str = "") -> list[Finding]:
-    """What comes of the functions if the code is changed."""
+    """Findings on the functions if the code is changed."""
     text = next(iter(source.files.values()))
     assert old in text
     compiler = find_compiler()
@@ -95,7 +95,7 @@ def test_branches_that_are_not_taken_do_not_count() -> None:
     a = r.leaf("a", PARAMETER << 2)
     tape = Tape.of(r, y=[r.apply("select", r.apply("gt", a, 0), r.sqrt(a), r.div(1, a * a - 4))])
     bound = first_order(tape, {"a": np.array([4.0, -1.0, -2 + 1e-15])}, 3)
-    # Of the quotient -1/3, and of 1 and 1 - 4 times its slope 1/9.
+    # Error of the quotient -1/3, and of 1 and 1 - 4 times its slope 1/9.
     np.testing.assert_allclose(bound.arithmetic[:2, 0], [2 * EPS, EPS * (1 / 3 + 4 / 9)])
     assert bound.divisors[0] == 0 and 0.05 < bound.divisors[2] < 1
 

@@ -39,7 +39,7 @@ class Statics:
         self.GM = self.draft / 2 + self.radius - height
 
     def heel(self, moment: float) -> float:
-        """Of a wall-sided hull: mass (GM + BM/2 tan^2 phi) sin phi = moment cos phi, moment in kg m."""
+        """Heel of a wall-sided hull: mass (GM + BM/2 tan^2 phi) sin phi = moment cos phi, moment in kg m."""
         tangent = brentq(lambda T: self.mass * (self.GM + self.radius / 2 * T**2) * T - moment, 0, 1, xtol=1e-15)
         return float(np.arctan(tangent))
 

@@ -173,8 +173,8 @@ def test_three_formulations_agree() -> None:
 
 
 def test_gyroscopic_moment_of_a_yawing_nacelle() -> None:
-    """The angular momentum I Omega along the shaft turns with the yaw rate about z, towards y. That takes a moment
-    I Omega yaw_dot cos(tilt) about y on the rotor; the opposite one acts on the platform: its pitch becomes negative, upwind."""
+    """The angular momentum I Omega along the shaft turns with the yaw rate about z, towards y. The turn takes a moment I Omega
+    yaw_dot cos(tilt) about y on the rotor; the opposite one acts on the platform: its pitch becomes negative, upwind."""
     q, u = np.zeros((2, 8)), np.zeros((2, 8))
     u[:, 6], u[:, 7] = 0.01, (nrel.RATED_SPEED, -nrel.RATED_SPEED)
     k = values(turbine(**BARE).embedding(), States(q, u), "k_tilde")["k_tilde"][:, 4]

@@ -88,7 +88,7 @@ def forces(n: int, m: int) -> np.ndarray:
 
 
 def cuts(order: int, n: int = INPUTS // 3 + 1) -> np.ndarray:
-    """Of cubes in any attitude, dry and sunk, along faces and edges, and what has no attitude; (n, 4)."""
+    """Cuts of cubes in any attitude, dry and sunk, along faces and edges, and without an attitude; (n, 4)."""
     rng = np.random.default_rng(order)
     e = rng.normal(size=(n, 4)) * 10.0 ** rng.uniform(-3, 1, (n, 4))
     e[:, 0] = rng.uniform(-0.7, 0.7, n) * np.abs(e[:, 1:]).sum(axis=1)

@@ -23,7 +23,7 @@ def call(op: str) -> Any:
     return lambda r, x, y, p: r.apply(op, x)
 
 
-# Of x, y and a parameter, all between -2 and 2 but where they are mapped elsewhere.
+# Expressions in x, y and a parameter, all between -2 and 2 but where they are mapped elsewhere.
 VALUES = {
     "sum": lambda r, x, y, p: x + y - p * x + 2, "product": lambda r, x, y, p: x * y * p, "square": lambda r, x, y, p: x * x,
     "fourth": lambda r, x, y, p: x**4, "quotient": lambda r, x, y, p: y / x, "reciprocal": lambda r, x, y, p: 3 / (x * x + 1),

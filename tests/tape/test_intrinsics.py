@@ -313,7 +313,7 @@ def test_calls_with_parameters_run_in_the_prologue(backend: str) -> None:
 
 @pytest.mark.parametrize("name", ["plain", "singular mass", "as many rows as speeds", "light and heavy"])
 def test_derivatives(name: str) -> None:
-    """Of x and lam by all values at once, along a random direction, against central differences with 40 digits."""
+    """Derivatives of x and lam by all values at once, along a random direction, against central differences with 40 digits."""
     given, _ = PROBLEMS[name]
     rng = np.random.default_rng(3)
     x, _ = given.solution()

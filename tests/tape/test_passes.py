@@ -1,4 +1,4 @@
-"""What is done to tapes: prune, merge, specialize, substitute, hoist, count."""
+"""Passes over tapes: prune, merge, specialize, substitute, hoist, count."""
 
 from __future__ import annotations
 

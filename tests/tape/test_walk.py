@@ -91,7 +91,7 @@ def test_expressions_and_polynomials() -> None:
 
 
 class Depth(Arithmetic):
-    """How many operations wait for each other."""
+    """Number of operations that wait for each other."""
 
     def leaf(self, node: Node) -> int:
         return 0

@@ -35,7 +35,7 @@ def states(module: Any, n: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray, 
 
 
 def difference(found: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Of each row, by its largest entry."""
+    """Difference of each row, by its largest entry."""
     return np.abs(found - wanted).max(axis=1) / np.maximum(np.abs(wanted).max(axis=1), 1e-300)
 
 

@@ -245,7 +245,7 @@ def test_states_between_long_steps_are_not_interpolated(folder):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_derivatives_of_model_exchange_are_those_of_simulate(version, folder):
-    """Of a mechanism whose motion by FMPy's CVODE is off by more than 1e-9 at the same tolerance."""
+    """Derivatives of a mechanism whose motion by FMPy's CVODE is off by more than 1e-9 at the same tolerance."""
     module = sd.systems.car_axis().compile(backend="c")
     path = module.to_fmu(folder / f"axis{version}.fmu", version, "model_exchange")
     assert compared(module, path, 0.5, "dop853") < 1e-11

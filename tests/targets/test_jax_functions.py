@@ -1,6 +1,7 @@
 """Functions for JAX: the same numbers as the C module, exact derivatives, batches, float32, the C library, messages.
 
-What is computed once is under `jax.jit` in most tests: otherwise XLA compiles every operation by itself, which takes seconds.
+Functions that are computed once are under `jax.jit` in most tests: otherwise XLA compiles every operation by itself, which takes
+seconds.
 """
 
 from __future__ import annotations

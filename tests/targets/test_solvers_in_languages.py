@@ -20,7 +20,7 @@ from symdyn.tape.intrinsics import Intrinsic, Multipliers, Saddle
 from tests.tape.test_algorithms import SIZES, forces, saddle_points
 
 ENDINGS = {"fortran": "f90", "matlab": "m", "rust": "rs"}
-# Of so many inputs one is taken: an interpreter is slow.
+# One of so many inputs is taken: an interpreter is slow.
 EVERY = {"fortran": 1, "matlab": 13, "rust": 1}
 FORTRAN = """module solvers
     implicit none

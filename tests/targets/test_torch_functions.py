@@ -36,7 +36,7 @@ def test_values_and_derivatives(name: str) -> None:
 
 
 def test_broadcast_parameters_collect_gradients() -> None:
-    """Of a sum over states, which is the sum of those of each."""
+    """Gradients of a sum over states, which are sums of those of each."""
     equations = sd.systems.double_pendulum().embedding()
     module = equations.compile()
     x = 0.3 * np.random.default_rng(2).normal(size=(7, 4))

@@ -23,7 +23,7 @@ from tests.urdf.texts import robot as text_of
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
 from symdyn.lab.robots.pinocchio_robot import PinocchioRobot
 
-# Of all sorts, without those that take longest: `symdyn bench robots` has them all, at 100 states each.
+# Robots of all sorts, without those that take longest: `symdyn bench robots` has them all, at 100 states each.
 LARGE = ("pr2", "tiago_pro", "baxter", "anymal_c_simple", "centauro", "g1_29dof_with_hand_rev_1_0", "g1_29dof_rev_1_0", "icub",
          "icub_reduced", "alex_sake_hands", "alex_nub_hands", "romeo_small", "simple_humanoid_classical", "talos_reduced",
          "b1-z1", "anymal-kinova", "go1", "human", "ur3_gripper", "ur5_gripper", "double_pendulum_continuous")

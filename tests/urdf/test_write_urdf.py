@@ -27,7 +27,7 @@ TREE = ALL.replace('type="planar"', 'type="prismatic"').replace('type="floating"
 
 
 def demand_equal(a: sd.System, b: sd.System) -> None:
-    """That two systems are described by the same names, numbers and expressions."""
+    """Demand that two systems are described by the same names, numbers and expressions."""
     assert [x.name for x in a.bodies] == [x.name for x in b.bodies]
     for x, y in zip(a.bodies, b.bodies, strict=True):
         assert (x.mass, x.inertia, x.com) == (y.mass, y.inertia, y.com)
@@ -89,7 +89,7 @@ def branching() -> sd.System:
 
 
 def test_frames_that_are_not_at_joints(tmp_path: Path) -> None:
-    """What is read back moves alike: mass matrix and gravity load; a drive is no part of the file."""
+    """The system that is read back moves alike: mass matrix and gravity load; a drive is no part of the file."""
     system = branching()
     again = sd.read_urdf(system.to_urdf(tmp_path / "tree.urdf"), damping=True)
     assert [b.name for b in again.bodies] == ["world", "one", "two + more", "three", "four"]

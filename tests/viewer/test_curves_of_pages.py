@@ -54,7 +54,7 @@ def data_of(html: str) -> dict[str, Any]:
 
 
 def pixels(page: Any, which: int = 0) -> np.ndarray:
-    """Of the canvas of a plot, (rows, columns, 4)."""
+    """Pixels of the canvas of a plot, (rows, columns, 4)."""
     high, wide = page.evaluate("which => (c => [c.height, c.width])(document.querySelectorAll('.plot canvas')[which])", which)
     return values_of(page, """which => { const c = document.querySelectorAll(".plot canvas")[which];
         return c.getContext("2d").getImageData(0, 0, c.width, c.height).data; }""", which).reshape(high, wide, 4)

@@ -24,7 +24,7 @@ from symdyn.pictures.scene import Scene
 
 
 def data_of(html: str) -> dict[str, Any]:
-    """What a page draws."""
+    """Data that a page draws."""
     found = re.search(r'<script id="data" type="application/json">(.*?)</script>', html, re.DOTALL)
     assert found is not None
     data: dict[str, Any] = json.loads(found[1])

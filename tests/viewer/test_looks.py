@@ -1,4 +1,4 @@
-"""What bodies and joints look like by rules: sizes against closed forms."""
+"""Look of bodies and joints by rules: sizes against closed forms."""
 
 from __future__ import annotations
 
