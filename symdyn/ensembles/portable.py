@@ -28,7 +28,7 @@ class NotSent(SymdynError):
 
 
 def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightSide]:
-    """Functions that members with rigid contacts call, whichever modes they come to; options: of `simulate`."""
+    """What members with rigid contacts call, whichever modes they come to; options: of `simulate`."""
     contacts, method = module.metadata.contacts, options.get("method", METHOD)
     if not contacts:
         return []
@@ -43,7 +43,7 @@ def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightS
 
 @dataclass(frozen=True)
 class _Provider:
-    """Provider of a module's libraries, and of the indices of the entries of its derivative by x."""
+    """What gives a module its libraries, and where its derivative by x has entries."""
 
     library: Callable[[str | RightSide], Library]
     given: Callable[[], Pattern | None]
@@ -87,8 +87,8 @@ class PortableModule:
         record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain(), "pattern": self._pattern()}
         return zlib.compress(json.dumps(record).encode())
 
-    def _places(self) -> list[Any] | None:
-        """Indices of the entries of the derivative for many states with few entries."""
+    def _pattern(self) -> list[Any] | None:
+        """Of many states whose derivative has few entries."""
         if self.module.metadata.sizes.x < LEAST_STATES:
             return None
         there = self.module.jacobian_indices()

@@ -15,8 +15,8 @@ from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape, reachable
 
-# Results for equations that are still in use: the search for the function, its text and its reader each need them.
-_found: WeakKeyDictionary[Equations, Places | None] = WeakKeyDictionary()
+# What was found of equations that are still in use: whether there is the function, its text and its reader each take it.
+_found: WeakKeyDictionary[Equations, Pattern | None] = WeakKeyDictionary()
 
 
 def pattern(equations: Equations) -> Pattern | None:
@@ -69,7 +69,7 @@ def packed_tape(equations: Equations) -> Tape:
 
 
 def _leaves(equations: Equations) -> list[Any]:
-    """Leaf that stands for every state; None where nothing depends on it."""
+    """Of every state the leaf that stands for it; None where nothing depends on it."""
     symbols = equations.symbols
     known = {node.args[1]: node for node in reachable(equations.quantity("rhs").tolist()) if node.op == "leaf"}
     return [known.get(s.name) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]

@@ -41,9 +41,7 @@ from symdyn.turning import turns
 
 VERSIONS = (3, 2)
 KINDS = ("model_exchange", "co_simulation")
-# Elements of the description in version 2.
-_ELEMENTS = {"model_exchange": "ModelExchange", "co_simulation": "CoSimulation"}
-# Tolerance of a step of co-simulation, where the importer gives none.
+# The tolerance of a step of co-simulation where the importer gives none.
 TOLERANCE = 1e-9
 # An FMU allocates memory and compares texts; the package of tcc brings neither the headers of libc nor the paths to them.
 NO_HEADERS = ("the C compiler found is tcc, which does not find the headers of the C library; install gcc or clang, or set "

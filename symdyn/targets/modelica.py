@@ -65,43 +65,6 @@ _FUNCTIONS = ("rhs", "outputs", "energy", "events", "event_resets", "validity_ch
 _OWN_FUNCTIONS = ("symdyn_asinh", "symdyn_acosh", "symdyn_atanh", "symdyn_erf")
 
 
-class Variable(NamedTuple):
-    """Declaration of a variable: its name with its size, attributes in brackets, the value it is bound to, a description."""
-
-    name: str
-    attributes: str
-    value: str
-    about: str
-
-
-class Clause(NamedTuple):
-    """Actions when a condition becomes true: values that states are set to, and the words that a simulation ends with."""
-
-    condition: str
-    resets: tuple[tuple[str, str], ...]
-    stops: str
-
-
-class Sample(NamedTuple):
-    """An instance of the model in the test: its modifications, the rates of its states under a name, and pairs of a claim and
-    what it means if it does not hold."""
-
-    name: str
-    modifications: str
-    rates: str
-    states: tuple[str, ...]
-    claims: tuple[tuple[str, str], ...]
-
-
-class _Violation(NamedTuple):
-    """Name of the largest of some residuals, with its unit."""
-
-    name: str
-    unit: str
-    about: str
-    residuals: tuple[str, ...]
-
-
 def write_modelica(module: Module, folder: Any, *, q: Any = None, u: Any = None, z: Any = None, params: Any = None,
                    inputs: Any = None) -> list[Path]:
     """See Module.to_modelica."""
@@ -135,9 +98,7 @@ def _content(equations: Equations, specialize: Mapping[Any, float] | None) -> Co
     return with_violation(content_of(equations, names, True, bound, RightSide(baumgarte=constrained)))
 
 
-def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect,
-             start: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], str]:
-    """Context of the templates, and the name of the model."""
+def _context(metadata: ModuleMetadata, content: Content, dialect: Dialect, start: Mapping[str, np.ndarray]) -> ModelicaContext:
     names = [n for n in (*_FUNCTIONS, VIOLATION, "length") if n in content.tapes]
     whole = combined(content, names)
     tape = whole.tape
@@ -280,8 +241,8 @@ def _lines(names: Sequence[str]) -> list[str]:
 
 
 def _clauses(metadata: ModuleMetadata, x: Sequence[str], events: Sequence[str], resets: Sequence[str]) -> list[list[Clause]]:
-    """Clauses for events and for unit quaternions that have drifted; in one list those that set the same states, of which only
-    one may do so at a time."""
+    """Clauses for events and for unit quaternions that have drifted; those that set the same states are in one list, of which
+    only one may do so at a time."""
     rest = iter(resets)
     clauses = []
     for event, value in zip(metadata.events, events, strict=True):
@@ -346,7 +307,7 @@ def _samples(metadata: ModuleMetadata, content: Content, identifiers: Mapping[st
 
 
 def _claims(content: Content, function: str, variables: Sequence[str], values: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Values of a function at a state, where it is defined there."""
+    """Claims about the results of a function at a state, if it is defined there."""
     tapes: list[Tape | None] = [content.tapes.get(function), content.singular_fallback.get(function)]
     for tape in tapes:
         result = result_at(function, tape, values, "") if tape is not None else None

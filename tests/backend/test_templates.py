@@ -129,7 +129,7 @@ def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Pa
 
 
 def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
-    """Includes of a shipped template are looked for in the user's folder first, too."""
+    """What a shipped template includes is looked for in the user's folder first, too."""
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / "simulate.c.jinja").write_text("// no integrator for {{ model.name }}\n")
     text = emit(derived("pendulum"), "c", templates=tmp_path).files["pendulum.c"]
@@ -233,7 +233,7 @@ def test_broken_dialect(old: str, new: str, message: str, derived: Callable[...,
 
 
 def members(record: type) -> set[str]:
-    """Names that templates may read: fields, properties and methods."""
+    """What templates may read: fields, properties and methods."""
     own = {name for name, value in vars(record).items() if isinstance(value, property) or callable(value)}
     return {name for name in own | {f.name for f in dataclasses.fields(record)} if not name.startswith("_")}
 
@@ -250,9 +250,9 @@ def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
 
 
 @pytest.fixture
-def context(derived: Callable[..., Any]) -> Context:
-    """Context of the templates of a module in C."""
-    seen: list[Context] = []
+def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
+    """What the templates of a module in C, an FMU, a Modelica model and the page of a firmware package get."""
+    seen: dict[type, NamedRecords] = {}
 
     def spy(self: NamedRecords) -> dict[str, Any]:
         seen.setdefault(type(self), self)
