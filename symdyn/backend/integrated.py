@@ -23,8 +23,8 @@ OF_CARRYING = ("carried_columns",)
 OF_BOUNDS = ("event_ranges", "event_bounds")
 # Events that wait until they are taken are rows of which, time, state before, state after.
 _NOTE = 2
-# Most of them, with three more of each kind.
-_WAITING = 64
+# No step begins while so many wait; each step may add some, see `most_events`.
+WAITING = 64
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,19 @@ class Shape:
     @property
     def most_events(self) -> int:
         """Number of events that may wait until they are taken."""
-        return _WAITING + 3 * len(self.events)
+        return most_events(len(self.events))
 
     @property
     def held(self) -> list[int]:
         """The entries of [q; u] that events reset and that stay when constraints are met, in order."""
         middle = self.sizes["q"] + self.sizes["u"]
         return sorted({index for index in self.resets if index < middle}) if self.n_rows and self.directed else []
+
+
+def most_events(n: int) -> int:
+    """How many events may wait, of n kinds: at the next time after WAITING - 1 all kinds may happen, and once in a run each kind
+    is noted as not resolved and as not proved, and one as depending on the order."""
+    return WAITING + 3 * n
 
 
 def functions(needs: Sequence[str], arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,
@@ -140,7 +146,7 @@ def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, i
         result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
     if shape.events:
         result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_NOTE", _NOTE + 2 * shape.n_x),
-                   ("SYMDYN_NOTES", shape.most_events + 1)]
+                   ("SYMDYN_WAITING", WAITING), ("SYMDYN_NOTES", shape.most_events)]
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))

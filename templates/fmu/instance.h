@@ -20,7 +20,7 @@ enum {
 };
 enum { FMU_INSTANTIATED, FMU_INITIALIZATION, FMU_EVENT_MODE, FMU_CONTINUOUS, FMU_STEPPING, FMU_TERMINATED };
 enum { FMU_GOOD = 0, FMU_FAILED = 1, FMU_STOPPED = 2 };
-enum { FMU_ROWS = FMU_N_X + FMU_N_OUTPUTS, FMU_NOTES = 64 + 3 * FMU_N_EVENTS };
+enum { FMU_ROWS = FMU_N_X + FMU_N_OUTPUTS };
 
 // All that a copy of the state holds, besides the memory of the integrator.
 typedef struct {
@@ -38,7 +38,9 @@ typedef struct fmu_instance {
     int has_rates, has_outputs, has_derivatives;
     double rates[FMU_N_X], outputs[FMU_N_OUTPUTS + 1];
     double by_x[FMU_ROWS * FMU_N_X], by_inputs[FMU_ROWS * FMU_N_INPUTS + 1], by_p[FMU_ROWS * FMU_N_P + 1];
-    double notes[FMU_NOTES * (2 + 2 * FMU_N_X)];
+#if FMU_N_EVENTS
+    double notes[FMU_FUNCTION(most_events) * (2 + 2 * FMU_N_X)];
+#endif
     symdyn_problem problem;
     int may_return_early;
     void *run, *block;

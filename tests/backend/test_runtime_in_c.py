@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symdyn.backend import integrated
 from symdyn.backend.band import Band
 from symdyn.backend.context import Corrections, Integrator, Manifold
 from symdyn.backend.gathered import Gathered
@@ -94,17 +95,21 @@ class Run:
 
     def events(self, n_events: int) -> np.ndarray:
         """Rows of which, time, state before, state after."""
-        rows = np.zeros((64 + 3 * n_events, 2 + 2 * self.n))
+        rows = np.zeros((integrated.most_events(n_events), 2 + 2 * self.n))
         self.library.symdyn_simulation_events.restype = ctypes.c_long
         return rows[:self.library.symdyn_simulation_events(self.address, pointer(rows))]
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """States at the times, after which the run is over."""
+        status, written, x = self.go(times)
+        assert status == 0 and written == len(times)
+        return x
+
+    def go(self, times: np.ndarray) -> tuple[int, int, np.ndarray]:
+        """Status, how many states at the times were written, and these."""
         x, written = np.full((len(times), self.n), np.nan), ctypes.c_long(0)
         given = ctypes.c_long(100_000), pointer(times), ctypes.c_long(len(times)), pointer(x), ctypes.byref(written)
-        status = self.library.symdyn_simulation_go(self.address, 0, *given)
-        assert status == 0 and written.value == len(times)
-        return x
+        return self.library.symdyn_simulation_go(self.address, 0, *given), written.value, x
 
     def report(self) -> RunReport:
         out, states = RunReport(), np.zeros((2, self.n))
@@ -365,6 +370,22 @@ def test_zeros_of_a_cubic_and_a_reset(build: Build, tmp_path: Path) -> None:
     np.testing.assert_allclose(rows[:, 1], [0.3, 0.5, 0.50001, 0.75], rtol=0, atol=1e-12)
     np.testing.assert_allclose(rows[3, 2:], [0.75, 0.75, 0.75, -1.0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(x, [[0.2, 0.2], [1.0, -0.75]], rtol=0, atol=1e-12)
+
+
+def test_events_wait_until_they_are_taken(build: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With room for few of them the integrator stops again and again, and no zero of a sine is lost."""
+    monkeypatch.setattr(integrated, "WAITING", 2)
+    shape = Shape({"q": 1, "u": 0, "z": 0, "inputs": 0}, 0, (), [EventRecord("a", 0, False, (), False, (), ())])
+    text = integrator("dop853", shape, {"field": "out[0] = 1.0;", "events_at": "out[0] = sin(10.0*x[0]);"}, tmp_path)
+    run = Run(build(text), [0.1], (0.1, 10.0), 1e-9, look=1)
+    taken, status = [run.events(1)], STATUS.STORE_FULL
+    while status == STATUS.STORE_FULL:
+        status = run.go(np.array([10.0]))[0]
+        taken.append(run.events(1))
+    assert status == STATUS.DONE and max(map(len, taken)) <= integrated.most_events(1) == 5 and len(taken) > 10
+    np.testing.assert_allclose(np.concatenate(taken)[:, 1], np.arange(1, 32) * np.pi / 10, rtol=0, atol=1e-12)
+    with pytest.raises(AssertionError, match="noted has no room"):
+        build(text.replace("#define SYMDYN_NOTES 5", "#define SYMDYN_NOTES 4"))
 
 
 ROOF = "double d[2] = {ud[0] - 0.5003, ud[1] - 0.5003}; const double far = fmax(fabs(d[0]), fabs(d[1])); " \

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.backend.c_records import fields_of
+from symdyn.backend.integrated import most_events
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.inputs.inputs import not_finite
@@ -38,8 +39,6 @@ STEPS_AT_ONCE = 4096
 # configurations those whose sensitivities lost a hundred tolerances or more were moved by 4,000 to 6e8; regular runs by 12 at
 # most.
 FAR = 1000.0
-# Most events that wait to be taken, besides three of each kind and one more.
-_EVENTS_WAITING = 64
 
 
 class Problem(ctypes.Structure):
@@ -49,11 +48,6 @@ class Problem(ctypes.Structure):
 
 
 _InputFunction = dict(Problem._fields_)["function"]
-
-
-def events_waiting(n_events: int) -> int:
-    """How many rows of events there may be at once, see `noted` in the generated source."""
-    return _EVENTS_WAITING + 3 * n_events + 1
 
 
 class Run:
@@ -90,7 +84,7 @@ class Run:
         self.rows: np.ndarray | None = None
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
-            self.rows = np.zeros((events_waiting(len(self.look)), 2 + 2 * self.n_x))
+            self.rows = np.zeros((most_events(len(self.look)), 2 + 2 * self.n_x))
             library.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
                                                 ctypes.c_double(request.event_spacing))
             if request.carried is not None:

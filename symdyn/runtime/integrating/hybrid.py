@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.c_records import codes_of, fields_of
+from symdyn.backend.integrated import most_events
 from symdyn.backend.right_side import RightSide
 from symdyn.contact_kinds import CLUTCH
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.integrating import slip_begins
-from symdyn.runtime.integrating.compiled import FAR, Problem, events_waiting
+from symdyn.runtime.integrating.compiled import FAR, Problem
 from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.stabilization import Corrections
@@ -162,7 +163,7 @@ class Motion:
         self.sign, self.left = take(record, "sign", np.zeros(n)), take(record, "left", np.full(n, -np.inf))
         self.slipping = take(record, "slipping", np.zeros(n, dtype=np.intc))
         put(record, np.intc, old_mode=n, old_still=n, old_passed=n, ruled_out=n, look=n_events, leaves=n)
-        put(record, float, old_sign=n, old_x=n_x, rows_of_events=events_waiting(n_events) * (2 + 2 * n_x),
+        put(record, float, old_sign=n, old_x=n_x, rows_of_events=most_events(n_events) * (2 + 2 * n_x),
             states=max(2 * n_x, n_rows), ahead=sizes.x + 2 * n)
         self.begin, self.end = (take(record, name, np.zeros(MOST_PHASES)) for name in ("phase_begin", "phase_end"))
         self.phase_p = take(record, "phase_p", np.zeros((MOST_PHASES + 1, self.n_p)))

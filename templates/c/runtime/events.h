@@ -674,9 +674,10 @@ __attribute__((noinline)) static int symdyn_event_far(symdyn_run *run) {
 // Search the latest step for events: note them, and end the step at the first that stops the motion or changes its state.
 // Panels are divided until it is certain what happens in each, the rest of the step waiting in `ends`.
 __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
+    enum { DEPTH = 64 };  // of halves of halves: no more than 46 are longer than twice 1e-14 of the span
     const double least =
         1e-14 * run->h_floor / (symdyn_eps * symdyn_eps);  // times that are closer count as one: 1e-14 of the span
-    double left = run->t_old, ends[64] = {run->t}, v[SYMDYN_PANEL + 1][SYMDYN_N_EVENTS];
+    double left = run->t_old, ends[DEPTH] = {run->t}, v[SYMDYN_PANEL + 1][SYMDYN_N_EVENTS];
     double states[SYMDYN_PANEL + 1][SYMDYN_NX], xd[SYMDYN_NX], *const x = states[SYMDYN_PANEL - 1];
     int failure = 0, n = 1;
     run->events.divisions = run->events.proofs = 0;
@@ -689,7 +690,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         const double right = ends[n - 1], middle = 0.5 * (left + right), width = fabs(right - left);
         double first = right, root[SYMDYN_N_EVENTS];
         int passed[SYMDYN_N_EVENTS], any = 0, cut = 0, resets = 0, again = 0;
-        const int divisible = n < 64 && width > fmax(2.0 * least, 16.0 * symdyn_eps * fabs(right));
+        const int divisible = n < DEPTH && width > fmax(2.0 * least, 16.0 * symdyn_eps * fabs(right));
         if (divisible && run->events.spacing > 0.0 && SYMDYN_PANEL_WIDEST * width > run->events.spacing) {
             ends[n++] = middle;
             continue;
@@ -783,7 +784,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
             if (run->events.fired[k]) run->events.leaving[k] = 0;
             run->events.now[k] = run->events.left[k];
         }
-        if (cut || resets || run->events.n_noted >= 64) {
+        if (cut || resets || run->events.n_noted >= SYMDYN_WAITING) {
             run->unstored = first != run->t_old;  // else it is
             run->t = first;
             run->t_low = 0.0;
@@ -833,8 +834,8 @@ static int symdyn_resume(symdyn_run *run) {
     const int pending = run->events.pending;
     double before[SYMDYN_N_EVENTS];
     int failure = 0;
-    if (!run->events.looking || (run->events.begun && !pending && run->events.n_noted < 64)) return 0;
-    if (run->events.n_noted >= 64) {  // until they are taken
+    if (!run->events.looking || (run->events.begun && !pending && run->events.n_noted < SYMDYN_WAITING)) return 0;
+    if (run->events.n_noted >= SYMDYN_WAITING) {  // until they are taken
         run->status = SYMDYN_STORE_FULL;
         return 1;
     }

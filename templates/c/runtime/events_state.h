@@ -1,6 +1,10 @@
 // Memory of the search for events in a run.
 #pragma once
 
+#if SYMDYN_NOTES < SYMDYN_WAITING + 3 * SYMDYN_N_EVENTS
+#error "noted has no room for the events of a step that begins with SYMDYN_WAITING - 1 of them"
+#endif
+
 typedef struct {
     int looking, look[SYMDYN_N_EVENTS];                   // whether for any, for which
     double side[SYMDYN_N_EVENTS], left[SYMDYN_N_EVENTS];  // sign of each quantity; what is left of those that vanished last
