@@ -25,3 +25,8 @@ def in_radians(coordinate_unit: str | None) -> bool:
 def force_unit(speed_unit: str | None) -> str:
     """The unit of what does work along a speed in this unit, "" where it is not known: a moment, a force."""
     return "N m" if turns(speed_unit) else "N" if speed_unit == "m/s" else ""
+
+
+def stiffness_unit(speed_unit: str | None) -> str:
+    """The unit of such a force by the displacement that goes with it, "" where it is not known: N m by rad, N by m."""
+    return {"N m": "N m", "N": "N/m"}.get(force_unit(speed_unit), "")

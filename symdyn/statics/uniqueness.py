@@ -17,10 +17,10 @@ from symdyn.statics.sensitivity import second
 from symdyn.statics.spectrum import ZERO
 from symdyn.statics.terms import OperatingPoint, coordinate_names, multiplier, null_space
 from symdyn.tape.intrinsics import RANK
+from symdyn.turning import stiffness_unit
 
 # Where parameters or inputs are solved for, less than this part of the largest stiffness, scaled, counts as none.
 LEAST = 1e-9
-_STIFFNESSES = {"rad/s": "N m", "m/s": "N/m"}
 
 
 def demand_stiffness(search: Search) -> None:
@@ -103,7 +103,7 @@ def _lost(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray
     result = [each for each in (_contribution(point, states, u, v, k) for k in range(len(point.p) + len(point.inputs))) if each]
     if not result:
         return ""
-    unit = _STIFFNESSES.get(point.module.metadata.units.get(point.module.metadata.u[leader], ""), "(N, m)")
+    unit = stiffness_unit(point.module.metadata.units.get(point.module.metadata.u[leader])) or "(N, m)"
     by = abs(u[leader] * v[leader]) or float(np.abs(u).max() * np.abs(v).max())
     most, together = max(abs(each) for each in result) / by, abs(sum(result)) / by
     return (f"loads make a stiffness of {together:.3g} {unit} in sums of terms of {max(terms / by, most):.3g} {unit}, known to "

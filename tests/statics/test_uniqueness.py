@@ -60,6 +60,17 @@ def test_loads_that_cancel_are_not_called_none() -> None:
         rails(coupled, -coupled - SOFT * B, 0 * C).equilibrium()
 
 
+def test_stiffness_of_a_coordinate_without_a_unit_is_a_moment() -> None:
+    """Speeds in 1/s count as turning, as everywhere: what acts along them is a moment."""
+    p = sd.parameters("p1:4")
+    s = sd.System("balanced")
+    s.add_joint(sd.Custom("wire", s.ground, s.add_body("bead", mass=1), [A], None, [A, 0, 0]))
+    s.add_joint_force("wire", -(p[0] + p[1] - p[2]) * A)
+    s.defaults = dict(zip(p, (0.1, 0.2, 0.3), strict=True))
+    with pytest.raises(EquilibriumNotUnique, match=r"a \(1.00\) loads make a stiffness of .*e-17 N m in sums of terms of 0.3 N m"):
+        s.embedding().compile(backend="numpy").equilibrium()
+
+
 def test_stiffness_under_constraints_and_with_extra_states() -> None:
     """A constraint in place of the spring K leaves nothing to cancel; an integrator that acts with k is one of the loads."""
     assert rails(-SOFT * A, 0 * B, constraint=A - B).equilibrium().verdict == "neutral"
