@@ -624,6 +624,18 @@ def test_dependent_constraints_without_numbers(coordinates: str) -> None:
     assert any("they depend on the others at every state tried" in note for note in notes)
 
 
+def test_dependence_without_numbers_in_euler_parameters() -> None:
+    """A parallelogram, whose bars begin on one line: 18 speeds less the one of its motion are held; on the line 16 are."""
+    m = sd.parameters("m")
+    s = sd.System("parallelogram")
+    left, bar, right = (s.add_body(name, mass=m, inertia=[1, 2, 3]) for name in ("left", "bar", "right"))
+    for name, parent, child, place in (("O", s.ground, left, 0), ("A", left, bar, 1), ("B", bar, right, 2)):
+        s.add_joint(sd.Revolute(name, parent, child, axis=[0, 0, 1], parent_point=[place, 0, 0]))
+    s.close_loop(sd.Revolute("C", s.ground, right, axis=[0, 0, 1], parent_point=[2, 0, 0], child_point=[-1, 0, 0]))
+    notes = s.augmented("absolute", sd.EulerParameters()).notes
+    assert any("they depend on the others at every state tried" in note and "(rank 17 of 20)" in note for note in notes), notes
+
+
 def test_dependence_is_unknown_where_random_numbers_leave_no_state() -> None:
     s = sd.System("far", gravity=[0, -9.81])
     body = s.add_body("body", mass=1, inertia=1)
