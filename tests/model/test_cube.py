@@ -206,6 +206,8 @@ def test_no_depth_is_reported(evaluator: Any, e: list[float]) -> None:
         evaluator.many(np.zeros(2), np.zeros((2, 0)), np.array([[0.1, 1.0, 2.0, 3.0], e]), np.zeros((2, 0)))
     for order in ORDERS:
         assert np.isnan(Cube((order,), "").rows(e)).all()
+    precise = evaluate(taped(), dict(zip(NAMES, map(mpmath.mpf, e), strict=True)), 30)["cube"]
+    assert len(precise) == 34 and all(map(mpmath.isnan, precise))
 
 
 # -- derivatives on the tape
