@@ -16,12 +16,15 @@ import pytest
 
 import symdyn as sd
 from symdyn import systems
+from symdyn.cli.parser import make_parser
 from symdyn.ensembles import Ensemble
 from symdyn.facade import EquationsFacade, MotionFacade, SystemFacade
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.integrating.ode_solver import CompiledSolver
+from symdyn.runtime.integrating.simulate import RTOL
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.statics.actuation import Actuation
@@ -128,6 +131,14 @@ def test_an_editor_shows_signatures_with_defaults(jedi: ModuleType) -> None:
     lines = text.split("\n")
     [signature] = jedi.Script(text).get_signatures(len(lines), len(lines[-1]))
     assert {"t", "q", "u", "params", "inputs", "rtol", "method", "events"} <= {p.name for p in signature.params}
+
+
+def test_public_signatures_show_the_relative_tolerance_as_a_number() -> None:
+    """The site shows a signature as it is written, so each has the number, not the name that it has elsewhere."""
+    functions = [Module.simulate, Module.gradient, Module.simulate_batch, CompiledSolver.__init__, sd.fit]
+    assert [inspect.signature(f).parameters["rtol"].default for f in functions] == [RTOL] * len(functions)
+    assert all("rtol: float = 1e-8," in inspect.getsource(f) for f in functions)
+    assert make_parser().parse_args(["simulate", "pendulum"]).rtol == RTOL
 
 
 RETURNED = (Module, Solution, BatchSolution, Equations, MotionEquations, AugmentedEquations, Equilibrium, Equilibria,

@@ -21,7 +21,7 @@ from symdyn.runtime.batches.motions import IN_LANES, why_columns_one_by_one, why
 from symdyn.runtime.consistent import NotConsistent, advice
 from symdyn.runtime.gpu.device import OfDevice
 from symdyn.runtime.integrating.events import wanted
-from symdyn.runtime.integrating.simulate import checked_tolerances
+from symdyn.runtime.integrating.simulate import RTOL, checked_tolerances
 from symdyn.runtime.module import Module
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.runtime.solutions.states_only import StatesOnly
@@ -30,8 +30,6 @@ from symdyn.shown import shown
 GROUPS = ("q", "u", "z", "parameters", "inputs")
 # Longer messages of failed members are cut.
 MESSAGE = 400
-# The relative tolerance of `simulate`, where none is given.
-RTOL = 1e-8
 # Members whose doubts are listed.
 LISTED = 3
 # Numbers of motions that are held at a time, 8 bytes each; of a device, which computes more of them at once.

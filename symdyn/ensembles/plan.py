@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.backend.right_side import METHOD, RightSide
-from symdyn.ensembles.chunk import RTOL, Chunk, Setting, as_measured, events_serve, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.chunk import Chunk, Setting, as_measured, events_serve, motion, quiet, setting_of, vectors_serve
 from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
 from symdyn.ensembles.portable import PortableModule, of_contacts
@@ -24,7 +24,7 @@ from symdyn.runtime.gpu import device as devices
 from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.sensitivities import names_of
-from symdyn.runtime.integrating.simulate import checked_tolerances
+from symdyn.runtime.integrating.simulate import RTOL, checked_tolerances
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 

@@ -32,6 +32,7 @@ from symdyn.runtime.integrating.charts import locked
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import (
+    RTOL,
     check_fits,
     checked_method,
     checked_positive,
@@ -58,7 +59,7 @@ NO_VECTORS = "the C compiler has no vectors"
 
 
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
-                   inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
+                   inputs: Any = None, rtol: float = RTOL, atol: Any = None, max_step: float = 0.0,
                    first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
                    events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
                    extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True,

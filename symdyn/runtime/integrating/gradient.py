@@ -30,6 +30,7 @@ from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.sensitivities import Asked, gathered, unseen_jumps
 from symdyn.runtime.integrating.simulate import (
+    RTOL,
     checked_positive,
     checked_times,
     checked_tolerances,
@@ -89,7 +90,7 @@ class Gradient(Mapping[Any, float]):
 
 
 def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *,
-             z: Any = None, inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, max_step: float = 0.0,
+             z: Any = None, inputs: Any = None, rtol: float = RTOL, atol: Any = None, method: Any = None, max_step: float = 0.0,
              first_step: float = 0.0, stabilization: Any = None, events: Any = True, interpolation: str = "linear",
              extend: str = "error") -> Gradient:
     """See Module.gradient."""
