@@ -103,7 +103,7 @@ def in_range(values: Any, least: float, reached: bool, below: float) -> Any:
 
 
 def range_text(least: float, reached: bool, below: float) -> str:
-    """How a message asks for a number above `least`, or from it on if it is `reached`, and below another one, which may be
+    """Words of a message for a number above `least`, or from it on if it is `reached`, and below another one, which may be
     infinite."""
     if below < math.inf:
         return f"pass a number from {least:g} to below {below:g}"

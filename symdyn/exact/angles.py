@@ -26,7 +26,7 @@ class Inverse:
 
     @property
     def index(self) -> int:
-        """That of the node."""
+        """Index of the node."""
         return self.node.index
 
 

@@ -75,7 +75,7 @@ class Closures:
             self.system.add_constraint(y - polynomial, self.labels.text(self.c.name("equality", e)))
 
     def _offset(self, e: int, kind: str, number: int) -> Any:
-        """How far a joint or a tendon is from where the file has it."""
+        """Distance of a joint or a tendon from where the file has it."""
         if kind == "JOINT":
             if number not in self.tree.coordinates:
                 return sp.S.Zero

@@ -1,4 +1,4 @@
-"""How the orientation of a spherical or free joint is described."""
+"""Descriptions of the orientation of a spherical or free joint."""
 
 from __future__ import annotations
 

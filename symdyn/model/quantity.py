@@ -20,7 +20,7 @@ Place = tuple[sp.Expr, ...]
 # Kind -> units of the value and its derivatives by time.
 _UNITS = {"position": ("m", "m/s", "m/s^2"), "distance": ("m", "m/s", "m/s^2"), "rotation_matrix": ("", "1/s", "1/s^2"),
           "angular_velocity": ("rad/s", "rad/s^2")}
-# How components of a position and its derivatives are written.
+# Notation of components of a position and its derivatives.
 _OF_POINTS = ("position", "velocity", "acceleration")
 _LETTERS = ("r", "v", "a")
 OMEGA = r"\omega"

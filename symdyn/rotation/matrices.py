@@ -16,7 +16,7 @@ from symdyn.shown import shown
 if TYPE_CHECKING:
     from symdyn.given import Angle, Array, Axis, Matrix, Vector
 
-# How far the length of a vector given as a unit vector, or of Euler parameters, may be from 1; how far from zero the entries
+# Largest distance from 1 of the length of a vector given as a unit vector, or of Euler parameters; how far from zero the entries
 # of S + S^T of a skew-symmetric S of size 1.
 UNIT = 1e-9
 

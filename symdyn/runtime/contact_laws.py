@@ -367,7 +367,7 @@ class _Table:
         return lam, w, exact, shared
 
     def broken(self, chosen: np.ndarray, lam: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Which sites break an inequality, (n_chosen, n_sites)."""
+        """Mask of the sites that break an inequality, (n_chosen, n_sites)."""
         size = self.size
         force = np.maximum(np.abs(lam).max(axis=1, initial=0.0), size / max(np.diag(self.D).max(initial=0.0), 1e-300))
         result = np.zeros(chosen.shape, dtype=bool)

@@ -680,7 +680,7 @@ class Module:
         return rank(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
 
     def unique(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> np.ndarray:
-        """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`.
+        """Mask of the multipliers that the motion determines, (n_c,) of bool, by the same singular values as `rank`.
 
         >>> module = sd.systems.four_bar().compile(backend="numpy")
         >>> module.unique([0.3, 1.0, 2.0])
@@ -1052,9 +1052,9 @@ class Module:
         free, fixed, start, params, t, inputs, max_iterations   as for Module.equilibrium
         blades     sets of coordinates of the blades of a rotor, one set per shape: the same coordinate of every blade, in the
                    order in which blades lie ahead of each other in the sense of the azimuth, such as
-                   [("flap1", "flap2", "flap3")]: modes are named by multi-blade coordinates. That these make the equations
-                   constant is checked at `azimuths` positions; where they do not (weight on the blades), the periodic motion
-                   is found and judged by Floquet theory
+                   [("flap1", "flap2", "flap3")]: modes are named by multi-blade coordinates. A check at `azimuths`
+                   positions shows whether these make the equations constant; where they do not (weight on the blades), the
+                   periodic motion is found and judged by Floquet theory
         averaged   with blades: the mean of the equations over the azimuths in place of Floquet theory where they are periodic,
                    which is quicker and leaves out what is periodic; how much the entries vary is printed
         azimuth    the coordinate whose rate the speed is, where the names do not say it

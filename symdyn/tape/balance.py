@@ -18,7 +18,7 @@ from symdyn.tape.passes import ARITHMETIC, rebuild
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, unsigned
 
-# The time that an operation takes, in additions.
+# Time of an operation, in additions.
 _LATENCY = {"add": 1, "sub": 1, "mul": 1, "div": 4, "sqrt": 5, "neg": 0}
 _FUNCTION = 10
 _SUMS = ("add", "sub")

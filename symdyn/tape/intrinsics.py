@@ -90,7 +90,7 @@ class Intrinsic:
         raise NotImplementedError
 
     def by_others(self, k: int) -> tuple[int, list[tuple[int, int]]] | None:
-        """The relation of result k to others: divisor d and pairs (i, j) with results[k] values[d] = -sum(values[i] results[j]);
+        """Formula of result k from others: divisor d and pairs (i, j) with results[k] values[d] = -sum(values[i] results[j]);
         None where it does not. By repeated use all results are reached that do not follow."""
         return None
 

@@ -102,7 +102,7 @@ def _along(mover: _Mover, inertial: Inertial) -> float:
 
 
 def negligible(robot: Robot) -> float:
-    """How large the entries of an inertia that is none may be, kg m^2."""
+    """Largest entries of an inertia that is none, kg m^2."""
     entries = [abs(entry) for link in robot.links.values() if link.inertial is not None for entry in link.inertial.inertia]
     return _ROUNDING * max(entries, default=0.0)
 

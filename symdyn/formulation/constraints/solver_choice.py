@@ -1,4 +1,4 @@
-"""How accelerations of constrained motion are computed: by statements, in the way that takes the fewest operations, and by the
+"""Ways to compute accelerations of constrained motion: by statements, in the way that takes the fewest operations, and by the
 numeric algorithm where these lose their digits, or where no statements would do."""
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def _pivots(quantities: Constrained, result: Ranks | None, fewest: int | None) -
     whole = samples.smallest()
 
     def usual(order: tuple[tuple[int, int], ...]) -> float:
-        """How far the dependent speeds are from losing their rows, at most of the states."""
+        """Distance of the dependent speeds from losing their rows, at most of the states."""
         part = samples.of_columns([column for _, column in order]).smallest()
         return float(np.quantile(part / whole, 0.1))
 

@@ -27,7 +27,7 @@ from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import PARAMETER, is_zero
 from symdyn.tape.tape import Tape
 
-# How well a factor found on the tape must agree with the one found in numbers.
+# Tolerance between a factor found on the tape and the one found in numbers.
 _AGREEMENT = 1e-6
 
 

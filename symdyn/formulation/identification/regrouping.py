@@ -1,4 +1,4 @@
-"""How a dependent column of a regressor follows from independent ones, as expressions of the model's parameters.
+"""Factors by which a dependent column of a regressor follows from independent ones, as expressions of the model's parameters.
 
 The dependence is known from numbers; here the factors are found exactly. The equations of motion are linear in u_dot, and
 what they depend on follows from their derivatives by u_dot and u and their value at rest. At states where sines, cosines

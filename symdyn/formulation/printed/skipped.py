@@ -8,7 +8,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.tape.node import INPUT, PARAMETER, TIME, Node
 from symdyn.tape.tape import Tape
 
-# How the note on accelerations begins where the factors of the mass matrix are used.
+# Beginning of the note on accelerations where the factors of the mass matrix are used.
 BY_FACTORS = "accelerations by Schur complement"
 
 

@@ -161,7 +161,7 @@ def _alike(a: _Conflict, b: _Conflict) -> bool:
 
 
 def _defect(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], kept: Sequence[int]) -> float:
-    """That of the same rows with other numbers of the parameters; 0 where they do not contradict each other."""
+    """Defect of the same rows with other numbers of the parameters; 0 where they do not contradict each other."""
     draw = _draw(equations, numbers)
     result = _conflicts(draw, kept, equations.holonomic) if draw is not None else []
     return next((c.defect for c in result if _alike(conflict, c)), 0.0)

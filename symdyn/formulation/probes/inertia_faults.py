@@ -60,7 +60,7 @@ def joints_by_speed(model: Model) -> dict[sp.Symbol, Joint]:
 
 
 def massless(u: sp.Symbol, joint: Joint | None) -> str:
-    """That nothing with mass moves along a speed, which is that of a joint or of none, and what to do."""
+    """Message that nothing with mass moves along a speed, which is that of a joint or of none, with advice."""
     if joint is None:
         return f"no joint with mass or inertia moves with {u}; use its coordinate in the expression of a joint, or leave it out"
     return (f"joint {shown(joint.name)}: what it moves has no mass or inertia along {u}; give body "

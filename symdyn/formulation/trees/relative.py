@@ -1,4 +1,4 @@
-"""How two bodies of a tree move relative to the link that both hang on, in that link's axes.
+"""Motion of two bodies of a tree relative to the link that both hang on, in that link's axes.
 
 Seen from the nearest common link, what the links before it do has no part in a constraint between the two.
 """

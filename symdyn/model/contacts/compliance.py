@@ -48,7 +48,7 @@ class Bristles:
 
 @dataclass(frozen=True)
 class Compliance:
-    """How a compliant contact yields: N = stiffness d^exponent (1 + dissipation d_dot) at the depth d, never below 0.
+    """Compliance of a contact: N = stiffness d^exponent (1 + dissipation d_dot) at the depth d, never below 0.
 
     stiffness    N/m^exponent; `sd.contacts.hertz` gives that of spheres and planes
     exponent     a number from 1 on; 3/2: Hertz

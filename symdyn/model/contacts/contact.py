@@ -103,7 +103,8 @@ class Contact:
 
     @property
     def room(self) -> sp.Expr | None:
-        """How much smaller the shape on a is than the bore around it, m; None where there is no bore, or the shape is a point."""
+        """Difference in size between the bore and the shape on a in it, m; None where there is no bore, or the shape is a
+        point."""
         a, number = self.on_a, Faults().expression
         if not isinstance(self.on_b, Bore) or isinstance(a, Point):
             return None

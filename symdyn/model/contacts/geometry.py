@@ -473,7 +473,7 @@ class Tangent:
 
 
 def _reach(R: sp.Expr, tangent: Tangent, distance: sp.Expr) -> sp.Expr:
-    """How far along the normal of a closed curve a point is that has this distance from its middle; see Tangent."""
+    """Distance along the normal of a closed curve of a point that has this distance from its middle; see Tangent."""
     along = R * tangent.normal[0]
     return sp.sqrt(sp.Max(0, distance**2 - R**2 + along**2)) - along
 

@@ -32,7 +32,7 @@ class Element:
 
     @property
     def where(self) -> str:
-        """How messages call it."""
+        """Name in messages."""
         body = getattr(self.body, "name", self.body)
         return self.label or f"{self.kind} on {body}"
 

@@ -234,7 +234,7 @@ def numeric(expression: sp.Expr, symbols: Sequence[sp.Symbol] | None = None) -> 
 
 
 def rotation_residual(matrix: sp.ImmutableMatrix) -> float:
-    """How far a matrix is from a proper rotation: largest entry of R R^T - 1, or of det R - 1."""
+    """Distance of a matrix from a proper rotation: largest entry of R R^T - 1, or of det R - 1."""
     if matrix == sp.eye(3):
         return 0.0
     symbols = sorted(symbols_of(matrix), key=str)

@@ -75,8 +75,8 @@ class Columns:
 
 
 def held(module: Module, t: float, starts: np.ndarray, params: np.ndarray, columns: Columns) -> np.ndarray:
-    """Which motions may not have these sensitivities, as constraints depend on each other at the start, (n,) of bool; starts
-    (n, n_x), parameters (n, n_p), or one row of either."""
+    """Mask of the motions that may not have these sensitivities, as constraints depend on each other at the start, (n,) of bool;
+    starts (n, n_x), parameters (n, n_p), or one row of either."""
     changed = [name for name in columns.asked.columns if name in module.metadata.parameters]
     n_c, n = len(module.metadata.constraints), max(len(starts), len(params))
     if not n_c or not changed:
@@ -101,7 +101,7 @@ def without_effect(columns: Columns, rows: np.ndarray) -> np.ndarray:
 
 def doubtful(module: Module, columns: Columns, rows: np.ndarray, ends: tuple[np.ndarray, np.ndarray, np.ndarray],
              params: np.ndarray) -> np.ndarray:
-    """Which motions a run of its own may warn of, (n,) of bool: a parameter may cancel, or a state stay at a kink.
+    """Mask of the motions that a run of its own may warn of, (n,) of bool: a parameter may cancel, or a state stay at a kink.
 
     rows     of every motion one after the other, (n, n_t, n_x (1 + n_columns)), not a number where there is none
     ends     times, states and inputs where each begins and ends, (n, 2), (n, 2, n_x), (n, 2, n_in)

@@ -59,7 +59,8 @@ def consistent_starts(module: Module, t: float, starts: np.ndarray, params: np.n
 
 
 def _inconsistent(module: Module, t: float, x: np.ndarray, params: np.ndarray, own: float) -> np.ndarray:
-    """Which states (n, n_x) do not fulfil the constraints, as check_start judges one; own: the mechanism's length, m."""
+    """Mask of the states (n, n_x) that do not fulfil the constraints, as check_start judges one; own: the mechanism's length,
+    m."""
     residuals = (position_residual(module, t, x, params), velocity_residual(module, t, x, params, 1e-9 * own, each=True))
     return (np.abs(np.hstack(residuals)) > CONSISTENT).any(axis=1)
 

@@ -188,7 +188,7 @@ class Together:
         return np.stack([starts, self.states[:, 0]], axis=1)
 
     def _doubtful(self, columns: Columns, rows: np.ndarray) -> np.ndarray:
-        """Which motions a run of its own may warn of, (n,) of bool."""
+        """Mask of the motions that a run of its own may warn of, (n,) of bool."""
         n, n_x, begin = self.asked.n, self.module.metadata.sizes.x, self.asked.span[0]
         starts = np.broadcast_to(self.starts[:, :n_x], (n, n_x))
         t = np.column_stack([np.full(n, begin), self.reports["t"]])

@@ -97,7 +97,7 @@ def link_flags(compiler: Compiler) -> list[str]:
 
 
 def _family(flag: str) -> tuple[str, ...]:
-    """How options start that say the same as this one."""
+    """Beginning of the options that mean the same as this one."""
     if flag in ("-march=native", "-mcpu=native"):
         return ("-march=", "-mcpu=", "-target", "--target=")
     return (flag[:2] if flag.startswith("-O") else flag.partition("=")[0],)

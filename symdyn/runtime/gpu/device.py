@@ -43,7 +43,7 @@ class Device(Protocol):
         """A kernel, by its text in CUDA C, the name of the mechanism and the kernel's own."""
 
     def at_once(self, kernel: Any) -> int:
-        """How many threads of a kernel the device holds at once."""
+        """Number of threads of a kernel that the device holds at once."""
 
     def stacks(self, kernel: Any) -> int:
         """Bytes of memory that the stacks of a kernel's threads take, while it runs."""

@@ -25,8 +25,8 @@ LOOSE, FINEST, STIFF = "bs54", "taylor", "radau"
 LOOSE_RTOL, SHORT_RTOL, SHORT, FINEST_RTOL = 3e-5, 1e-7, 100, 1e-14
 LOOSE_TINY_RTOL, TINY = 3e-4, 20
 # Steps of the trial runs. Eigenvalues times the step of the explicit one beyond which its stability limits it for certain (the
-# limit of Dormand-Prince 8(5,3) is 6.4 on the negative, 6.0 on the imaginary axis). How much longer steps of an implicit method
-# must be, which costs more a step.
+# limit of Dormand-Prince 8(5,3) is 6.4 on the negative, 6.0 on the imaginary axis). Factor by which steps of an implicit method
+# must be longer, which costs more a step.
 TRIAL_STEPS, LIMITED, LONGER = 100, 5.0, 10.0
 # Small tolerances shorten the explicit steps of a stiff motion below that limit: its error has powers of the large eigenvalues
 # (products of 0.26 to 0.9 at rtol = 1e-12, of 1.1 to 5.6 at 1e-8; other motions have 0.03 to 5). Smallest product that is tried,

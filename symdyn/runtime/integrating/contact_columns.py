@@ -38,7 +38,7 @@ TOGETHER, NOISE = 1e-6, 1e-9
 # A rate that the curvature of the quantity outweighs within this part of the time since the switch before grazes zero.
 # The step of differences for that, of this time.
 GRAZES, NEARBY = 1e-6, 1e-4
-# Which event of a contact sets the time where several of it happen at once.
+# Order of the events of a contact that set the time where several happen at once.
 FIRST = ("closes", "opens", "sticks", "slips", "turns")
 
 
@@ -101,8 +101,8 @@ class Switch:
         return Moves(np.zeros(len(by)), x, of_p, of_inputs, np.where(sizes == 0, 1.0, sizes))
 
     def along(self, moves: Moves) -> tuple[np.ndarray, np.ndarray]:
-        """How the time of the switch moves, (k,), and the state after it at a given time, (k, n_x), with changes before it at a
-        given time. Raises EvaluationError where they have no derivative.
+        """Change of the time of the switch, (k,), and of the state after it at a given time, (k, n_x), with changes before it at
+        a given time. Raises EvaluationError where they have no derivative.
         """
         if self.made is None:
             return np.zeros(len(moves.x)), moves.x.copy()

@@ -966,7 +966,7 @@ class _Phases:
                             "`ignored` stay positive until its gap is open")
 
     def _slip(self, t: float, x: np.ndarray, k: int) -> float:
-        """How fast a contact slips, m/s."""
+        """Speed of slip of a contact, m/s."""
         return float(np.linalg.norm(self._numbers(t, x).slip[self.tangents[k]]))
 
     def _slow(self, at: Numbers, k: int) -> bool:

@@ -117,7 +117,7 @@ def unfit(module: Module, method: str, inputs: Inputs | None) -> str:
 
 
 def factors_of(module: Module, method: object, way: str) -> str:
-    """How an implicit method factorizes its matrices, in words; "" for other methods.
+    """Factorization of the matrices of an implicit method, in words; "" for other methods.
 
     way   of stabilization: Baumgarte's changes the derivative
     """

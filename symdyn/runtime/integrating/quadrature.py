@@ -108,7 +108,8 @@ class Integral:
 
     def judge(self, h: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, costs: Costs,
               outer: float) -> tuple[np.ndarray, np.ndarray]:
-        """Which steps of lengths h (n,) have to be taken again, shorter, and which of the others hold a jump, (n,) of bool each.
+        """Masks of the steps of lengths h (n,) that have to be taken again, shorter, and of the others that hold a jump, (n,) of
+        bool each.
 
         t, x, inputs, costs   at all of their stages, rows
         outer                 length of the step that these are within, 0: none

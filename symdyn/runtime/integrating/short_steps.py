@@ -25,7 +25,7 @@ TRIED, TRIED_OF_SCIPY = 1000, 1000
 # A look is worth a trial where steps are this part of the longest before, or where a run has taken so many times the steps of a
 # trial, and again with every doubling of these; the part of a run with functions of the user, which may jump, is larger.
 SHRUNK, OF_FUNCTIONS, MANY = 1e-3, 1e-2, 20
-# How far a cubic may be away, in tolerances, which radau eases for itself, at this part of the states; product of a step and the
+# Largest distance of a cubic, in tolerances, which radau eases for itself, at this part of the states; product of a step and the
 # largest eigenvalue below which stability asks for no shorter ones; how much further a rate goes to and fro than it gets.
 MISSED, MOST, STABLE, TO_AND_FRO = 1000.0, 0.9, 0.05, 20.0
 # Distances to either side of a motion at which a jump stays as it is, in those that its steps go; what is left of it nearby.

@@ -1,4 +1,4 @@
-"""How contacts begin to slip.
+"""Beginnings of slip in contacts.
 
 Friction acts against the slip, whose direction is that of its acceleration where it begins; where the friction cone was left this
 is against the friction force that held last. As the slip passes zero its direction is all but free: it turns by the rate of

@@ -78,7 +78,7 @@ def friction_energy(solution: Solution) -> dict[str, np.ndarray]:
 
 
 def _passed(solution: Solution, t: float, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Which rows of a solution lie after a reset, (n_t,) of bool."""
+    """Mask of the rows of a solution after a reset, (n_t,) of bool."""
     direction = 1.0 if solution.t[-1] >= solution.t[0] else -1.0
     passed = (solution.t - t) * direction > 0
     rows = np.flatnonzero(solution.t == t)

@@ -157,8 +157,8 @@ class Solution:
 
     @cached_property
     def factors(self) -> str:
-        """How an implicit method factorized its matrices: "banded: ...", "dense: ...", or "sparse: ..." by SciPy, with the sizes;
-        "" for other methods.
+        """Factorization of the matrices of an implicit method: "banded: ...", "dense: ...", or "sparse: ..." by SciPy, with the
+        sizes; "" for other methods.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.simulate((0, 1), method="Radau").factors
@@ -539,7 +539,7 @@ class Solution:
 
     @cached_property
     def unique(self) -> np.ndarray:
-        """Which multipliers the motion determines, (n_t, n_c) of bool; see Module.unique.
+        """Mask of the multipliers that the motion determines, (n_t, n_c) of bool; see Module.unique.
 
         >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
         >>> solution.unique[0]

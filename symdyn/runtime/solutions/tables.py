@@ -43,7 +43,7 @@ def number(value: Any) -> str:
 
 
 def facts(solution: Solution) -> list[tuple[str, str]]:
-    """How the run was computed: pairs of title and text."""
+    """Facts about the run: pairs of title and text."""
     rows = [("Formulation", str(solution.module.metadata.formulation)),
             ("Computed by", f"{solution.method} on {WHERE.get(solution.backend, solution.backend)}")]
     if len(solution.t):
