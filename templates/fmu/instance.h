@@ -182,17 +182,12 @@ static void fmu_take_motions(fmu_state *s, double t, double end) {
 
 // Why the integrator stopped.
 static int fmu_run_failed(fmu_instance *f, int status) {
-    static const char *const reasons[] = {"", "the right-hand side cannot be evaluated",
-        "the step became too small for the tolerance", "a state is not finite", "a time, state or tolerance makes no sense",
-        "the time lies before the latest step", "there is no way back onto the constraints",
-        "a quantity of an event is not finite", "events follow each other with hardly any time between", "there is no series",
-        "the constraints do not allow what a reset makes of a state"};
     symdyn_report report;
     double states[2 * FMU_N_X];
     FMU_FUNCTION(simulation_report)(f->run, &report, states);
     char why[300];
-    snprintf(why, sizeof why, "%s%s%s", status < 0 && status > -11 ? reasons[-status] : "unknown status",
-        report.reason ? ": " : "", report.reason ? FMU_FUNCTION(reason)(report.reason) : "");
+    snprintf(why, sizeof why, "%s%s%s", symdyn_status_text(status), report.reason ? ": " : "",
+        report.reason ? FMU_FUNCTION(reason)(report.reason) : "");
     f->s.running = 0;
     return fmu_fail(f, "the integrator stopped", why);
 }
@@ -345,7 +340,7 @@ static int fmu_step(fmu_instance *f, double step, double *reached) {
         symdyn_report report;
         double states[2 * FMU_N_X];
         FMU_FUNCTION(simulation_report)(f->run, &report, states);
-        if (status == 3) {
+        if (status == SYMDYN_STOPPED) {
             memcpy(s->x, states, FMU_N_X * sizeof(double));
             s->t = *reached = report.t;
             s->running = 0;

@@ -12,6 +12,7 @@ import pytest
 import symdyn as sd
 from symdyn.pipeline import emit, write_source
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.integrating.run_record import STATUS
 from tests.runtime.test_events import ball
 
 PROGRAM = """#include <stdalign.h>
@@ -47,6 +48,49 @@ def test_all_that_is_exported_is_declared(system: str, batch: bool) -> None:
     declared = set(re.findall(rf"^[a-z][\w *]*?\b{system}_(\w+)\(", files[f"{system}.h"], re.MULTILINE))
     assert exported == declared and "rhs" in exported and "simulation_go" in exported
     assert ("rhs_batch" in exported) == batch and ("simulation_look" in exported) == (system == "ball")
+
+
+@needs_c
+@pytest.mark.every_value
+@pytest.mark.parametrize("batch", [False, True])
+@pytest.mark.parametrize("system", ["double_pendulum", "four_bar", "ball"])
+def test_declarations_of_the_header_are_those_of_the_file(system: str, batch: bool, tmp_path: Path) -> None:
+    """A compiler reads the header before the file, which does not include it, so that it compiles alone, too."""
+    names = None if system != "ball" else ["rhs", "events", "event_resets"]
+    equations = ball().embedding() if system == "ball" else sd.systems.get(system).equations()
+    write_source(emit(equations, "c", names, batch=batch), tmp_path)
+    both = tmp_path / "both.c"
+    for text, code in ((f'#include "{system}.h"\n', 0), (f'#include "{system}.h"\nvoid {system}_prologue(void);\n', 1)):
+        both.write_text(f'{text}#include "{system}.c"\n')
+        done = subprocess.run([*require_compiler().command, "-std=c99", "-c", both, "-o", tmp_path / "both.o"],
+                              capture_output=True, text=True)
+        assert (done.returncode != 0) == code, done.stderr
+
+
+STATUSES = """#include <stdio.h>
+#include "double_pendulum.h"
+
+int main(void) {
+    const int statuses[] = {STATUSES};
+    printf("%d %d\\n", SYMDYN_DONE, SYMDYN_STOPPED);
+    for (int k = 0; k < N; k++) printf("%s\\n", symdyn_status_text(statuses[k]));
+    return 0;
+}
+"""
+
+
+@needs_c
+def test_a_program_reads_statuses_by_name_and_as_text(tmp_path: Path) -> None:
+    write_source(emit(sd.systems.get("double_pendulum").embedding(), "c"), tmp_path)
+    names = [f"SYMDYN_{name}" for name in vars(STATUS)]
+    text = STATUSES.replace("{STATUSES}", f"{{{', '.join(names)}, 99}}").replace("N;", f"{len(names) + 1};")
+    (tmp_path / "main.c").write_text(text)
+    done = subprocess.run([*require_compiler().command, "-std=c99", "-o", tmp_path / "run", tmp_path / "main.c"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    codes, *texts = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True).stdout.splitlines()
+    assert codes == "0 3" and texts[-1] == "unknown status" and len(set(texts)) == len(names) + 1
+    assert texts[list(vars(STATUS)).index("STEP_TOO_SMALL")] == "the step became too small for the tolerance"
 
 
 def test_an_option_leaves_the_integrator_out() -> None:

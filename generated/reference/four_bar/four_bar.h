@@ -127,9 +127,9 @@ int four_bar_F_d_rows(four_bar_frame *frame);
 int four_bar_lam_rows(four_bar_frame *frame);
 int four_bar_reactions_rows(four_bar_frame *frame);
 
+// Arguments of the right-hand side in addition to t and x.
 #ifndef SYMDYN_PROBLEM_TYPE
 #define SYMDYN_PROBLEM_TYPE
-// Arguments of the right-hand side in addition to t and x.
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
 // cubic, its ends held), constants.
@@ -144,10 +144,86 @@ typedef struct {
     double length;  // that residuals are measured by, m
 } symdyn_problem;
 
+#endif
+
+// Statuses of a run as text.
+#ifndef SYMDYN_STATUS_TEXT
+#define SYMDYN_STATUS_TEXT
+
+// Statuses of a run.
+#ifndef SYMDYN_STATUS
+#define SYMDYN_STATUS
+
+enum {
+    // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.
+    SYMDYN_DONE = 0,
+    SYMDYN_STEP_LIMIT = 1,
+    SYMDYN_STORE_FULL = 2,
+    SYMDYN_STOPPED = 3,
+    // Failures are negative, and final but for BAD_OUTPUT_TIME. Even at the smallest step:
+    SYMDYN_FIELD_FAILED = -1,       // the right-hand side cannot be evaluated
+    SYMDYN_STEP_TOO_SMALL = -2,     // the tolerance is not met
+    SYMDYN_STATE_NOT_FINITE = -3,   // NaN or Inf
+    SYMDYN_BAD_ARGUMENT = -4,       // start: a time, state, tolerance or step makes no sense
+    SYMDYN_BAD_OUTPUT_TIME = -5,    // a requested time lies before the latest step
+    SYMDYN_PROJECTION_FAILED = -6,  // even at the smallest step, no way back onto the constraints
+    SYMDYN_EVENT_FAILED = -7,       // a quantity of an event is not finite
+    SYMDYN_EVENT_AT_ONCE = -8,      // events again and again with hardly any time between
+    SYMDYN_NO_SERIES = -9,          // there is a right-hand side but no series of it
+    SYMDYN_RESET_REJECTED = -10,    // the constraints do not let an entry be what a reset makes it
+    SYMDYN_NO_CONSTANTS = -11,      // batches: the constants that follow from the parameters cannot be computed
+    SYMDYN_RESET_NOT_SMOOTH = -12   // what the constraints make of a reset has no derivative
+};
+
+#endif
+
+static inline const char *symdyn_status_text(int status) {
+    switch (status) {
+    case SYMDYN_DONE:
+        return "the end is reached";
+    case SYMDYN_STEP_LIMIT:
+        return "the run is under way";
+    case SYMDYN_STORE_FULL:
+        return "there is no room for the next step";
+    case SYMDYN_STOPPED:
+        return "an event ended the run";
+    case SYMDYN_FIELD_FAILED:
+        return "the right-hand side cannot be evaluated";
+    case SYMDYN_STEP_TOO_SMALL:
+        return "the step became too small for the tolerance";
+    case SYMDYN_STATE_NOT_FINITE:
+        return "a state is not finite";
+    case SYMDYN_BAD_ARGUMENT:
+        return "a time, state or tolerance makes no sense";
+    case SYMDYN_BAD_OUTPUT_TIME:
+        return "the time lies before the latest step";
+    case SYMDYN_PROJECTION_FAILED:
+        return "there is no way back onto the constraints";
+    case SYMDYN_EVENT_FAILED:
+        return "a quantity of an event is not finite";
+    case SYMDYN_EVENT_AT_ONCE:
+        return "events follow each other with hardly any time between";
+    case SYMDYN_NO_SERIES:
+        return "the right-hand side has no Taylor series";
+    case SYMDYN_RESET_REJECTED:
+        return "the constraints do not allow what a reset makes of a state";
+    case SYMDYN_NO_CONSTANTS:
+        return "the constants that follow from the parameters cannot be computed";
+    case SYMDYN_RESET_NOT_SMOOTH:
+        return "what the constraints make of a reset has no derivative";
+    default:
+        return "unknown status";
+    }
+}
+
+#endif
+
 // Report of a run.
+#ifndef SYMDYN_REPORT_TYPE
+#define SYMDYN_REPORT_TYPE
 
 typedef struct {
-    int status;                               // DONE, STEP_LIMIT, ..., or a failure
+    int status;                               // SYMDYN_DONE, SYMDYN_STEP_LIMIT, ..., or a failure
     double t, h;                              // present time; length of the step to be tried next
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
     // The latest evaluation that failed. reason: what a function returned, 0: results that are not finite, or a correction too
@@ -165,12 +241,12 @@ typedef struct {
     long n_divided, n_rough;             // gauss: steps that were divided; those done again by halves that differ
     double t_rough;                      // the latest of these
 } symdyn_report;
-#endif
 
+#endif
 // Integration. A run is a block of memory of simulation_size bytes, on a multiple of 64.
-// start    span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); x0, atol: 6. Returns 0 or a failure
+// start    span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); x0, atol: 6. Returns SYMDYN_DONE or a failure
 // go       by at most max_steps attempted steps; states at the times t[*written .. n) to the rows of x[n][6], or, with every, start
-//          and end of each step. Returns 0 at the end, 1 under way, 2 without room, 3 where an event ended it, or a failure < 0
+//          and end of each step. Returns a status
 // report   see symdyn_report; states: x (6), and x where an evaluation failed (6)
 long four_bar_simulation_size(void);
 int four_bar_simulation_start(void *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);

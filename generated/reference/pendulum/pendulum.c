@@ -64,6 +64,8 @@ static inline int symdyn_all_finite(const double *values, int n) {
 // The problem of a run, and its inputs at a time.
 
 // Arguments of the right-hand side in addition to t and x.
+#ifndef SYMDYN_PROBLEM_TYPE
+#define SYMDYN_PROBLEM_TYPE
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
 // cubic, its ends held), constants.
@@ -77,6 +79,8 @@ typedef struct {
     int project;    // whether states are kept on what holds for them after every step
     double length;  // that residuals are measured by, m
 } symdyn_problem;
+
+#endif
 
 enum { SYMDYN_INPUT_STOPPED = 100000 };
 
@@ -284,6 +288,7 @@ SYMDYN_EXPORT const char *pendulum_reason(int code) {
 
 // One call for many states: rows of t, of x = [q; u; z] (2), of ud (1), of inputs (0); strides are in rows, 0 repeats
 // the first row. Stops at the first fault (a result that is not finite is one) and leaves its row in `failed`.
+#ifndef PENDULUM_H  // its header has it, too
 typedef struct {
     long n;
     const double *t, *x, *ud, *inputs, *p, *c;
@@ -291,6 +296,7 @@ typedef struct {
     long t_stride, x_stride, ud_stride, inputs_stride;
     long failed;
 } pendulum_frame;
+#endif
 
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame) {
@@ -473,9 +479,11 @@ typedef struct {
 // struct, and one that was interrupted continues to the same bits.
 
 // Report of a run.
+#ifndef SYMDYN_REPORT_TYPE
+#define SYMDYN_REPORT_TYPE
 
 typedef struct {
-    int status;                               // DONE, STEP_LIMIT, ..., or a failure
+    int status;                               // SYMDYN_DONE, SYMDYN_STEP_LIMIT, ..., or a failure
     double t, h;                              // present time; length of the step to be tried next
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
     // The latest evaluation that failed. reason: what a function returned, 0: results that are not finite, or a correction too
@@ -494,7 +502,11 @@ typedef struct {
     double t_rough;                      // the latest of these
 } symdyn_report;
 
-// Results of a run.
+#endif
+
+// Statuses of a run.
+#ifndef SYMDYN_STATUS
+#define SYMDYN_STATUS
 
 enum {
     // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.
@@ -516,6 +528,8 @@ enum {
     SYMDYN_NO_CONSTANTS = -11,      // batches: the constants that follow from the parameters cannot be computed
     SYMDYN_RESET_NOT_SMOOTH = -12   // what the constraints make of a reset has no derivative
 };
+
+#endif
 
 // The type of times, which stay doubles where all else is in single precision.
 

@@ -1,5 +1,6 @@
 // Arguments of the right-hand side in addition to t and x.
-#pragma once
+#ifndef SYMDYN_PROBLEM_TYPE
+#define SYMDYN_PROBLEM_TYPE
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
 // cubic, its ends held), constants.
@@ -13,3 +14,5 @@ typedef struct {
     int project;    // whether states are kept on what holds for them after every step
     double length;  // that residuals are measured by, m
 } symdyn_problem;
+
+#endif

@@ -1,8 +1,9 @@
 // Report of a run.
-#pragma once
+#ifndef SYMDYN_REPORT_TYPE
+#define SYMDYN_REPORT_TYPE
 
 typedef struct {
-    int status;                               // DONE, STEP_LIMIT, ..., or a failure
+    int status;                               // SYMDYN_DONE, SYMDYN_STEP_LIMIT, ..., or a failure
     double t, h;                              // present time; length of the step to be tried next
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
     // The latest evaluation that failed. reason: what a function returned, 0: results that are not finite, or a correction too
@@ -20,3 +21,5 @@ typedef struct {
     long n_divided, n_rough;             // gauss: steps that were divided; those done again by halves that differ
     double t_rough;                      // the latest of these
 } symdyn_report;
+
+#endif

@@ -1,5 +1,6 @@
-// Results of a run.
-#pragma once
+// Statuses of a run.
+#ifndef SYMDYN_STATUS
+#define SYMDYN_STATUS
 
 enum {
     // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.
@@ -21,3 +22,5 @@ enum {
     SYMDYN_NO_CONSTANTS = -11,      // batches: the constants that follow from the parameters cannot be computed
     SYMDYN_RESET_NOT_SMOOTH = -12   // what the constraints make of a reset has no derivative
 };
+
+#endif
