@@ -25,7 +25,7 @@ def test_programs_that_are_missing(monkeypatch: pytest.MonkeyPatch, capsys: pyte
 
 
 def test_a_field_in_the_words_of_another_program() -> None:
-    """The statements that CVODES and diffrax get, in NumPy: they are those of the right-hand side."""
+    """The statements that CVODES and diffrax get, in NumPy, of three states at once: they are those of the right-hand side."""
     from types import SimpleNamespace
 
     import numpy as np
@@ -34,9 +34,9 @@ def test_a_field_in_the_words_of_another_program() -> None:
 
     equations = sd.systems.two_link_arm().equations()
     module = equations.compile(backend="numpy")
-    x = np.array([0.3, -0.4, 0.5, 0.6])
+    x = np.array([[0.3, -0.4, 0.5, 0.6], [-2.0, 1.0, 0.0, 3.0], [0.0, 0.0, 0.0, 0.0]])
     words = SimpleNamespace(sin=np.sin, cos=np.cos, vertcat=lambda *entries: np.array(entries))
     names = [*module.metadata.x, *module.metadata.parameters, *module.metadata.inputs]
-    values = [*x, *module.default_parameters, *[0.0] * len(module.metadata.inputs)]
+    values = [*x.T, *module.default_parameters, *[0.0] * len(module.metadata.inputs)]
     found = casadi_field(words, equations, dict(zip(names, values, strict=True)))
-    np.testing.assert_allclose(found, module.rhs(0.0, x), rtol=1e-14)
+    np.testing.assert_allclose(found.T, module.rhs(0.0, x), rtol=1e-14, atol=1e-15)
