@@ -9,14 +9,14 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.constraints import position_residual
+from symdyn.tape.intrinsics import RANK
 
 if TYPE_CHECKING:
     from symdyn.estimation.measured_motion import Rows
     from symdyn.runtime.module import Module
 
-# Singular values of the constraints below this part of the largest are those of dependent ones; what constraints of positions may
-# lack, as a part of the mechanism's length: more is no error of a measurement.
-RANK, FAR = 1e-8, 0.05
+# What constraints of positions may lack, as a part of the mechanism's length: more is no error of a measurement.
+FAR = 0.05
 
 
 def allowed(module: Module, motions: Sequence[Rows]) -> list[np.ndarray]:

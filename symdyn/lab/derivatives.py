@@ -45,6 +45,7 @@ from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.constraints import unique
 from symdyn.systems import get, names
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.intrinsics import RANK
 
 FUNCTIONS = ("rhs", "lam", "inverse_dynamics")
 GROUPS = ("x", "inputs", "params", "t", "ud")
@@ -53,8 +54,6 @@ DIGITS, STEP = 60, mpmath.mpf(10) ** -20
 # One random mechanism in so many is compiled to C besides, of which this is measured there: long code takes long to compile.
 IN_C = 20
 OF_C = ("rhs", "x")
-# Singular values below this part of the largest are those of dependent constraints.
-RANK = 1e-8
 
 
 @dataclass(frozen=True)

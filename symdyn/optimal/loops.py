@@ -16,12 +16,11 @@ import scipy.linalg
 
 from symdyn.errors import EvaluationError, SymdynError
 from symdyn.optimal.field import Arguments, Groups
+from symdyn.tape.intrinsics import RANK
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Diagonal entries of the triangular factor below this part of the largest belong to dependent constraints.
-DEPENDENT = 1e-8
 # States of a guess that are moved onto the constraints.
 MOVED = 21
 
@@ -115,7 +114,7 @@ def _independent(C_r: np.ndarray, among: np.ndarray) -> list[int]:
         return []
     _, R, order = scipy.linalg.qr(C_r[among].T, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
-    return sorted(int(among[k]) for k in order[:len(sizes)][sizes > DEPENDENT * sizes[0]])
+    return sorted(int(among[k]) for k in order[:len(sizes)][sizes > RANK * sizes[0]])
 
 
 def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, leading: Sequence[str]) -> np.ndarray:

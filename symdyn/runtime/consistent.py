@@ -28,7 +28,7 @@ from symdyn.runtime.constraints import (
 )
 from symdyn.runtime.inputs.inputs import inputs_at
 from symdyn.shown import name_of, shown
-from symdyn.tape.intrinsics import MASSLESS
+from symdyn.tape.intrinsics import MASSLESS, RANK
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -293,7 +293,7 @@ class _Search:
         if not self.kept_q:
             return np.eye(self.n_u)
         _, values, Vt = np.linalg.svd(self._evaluate("N", x)[self.kept_q])
-        rank = int((values > 1e-12 * max(values.max(initial=0.0), 1e-300)).sum())
+        rank = int((values > RANK * max(values.max(initial=0.0), 1e-300)).sum())
         basis: np.ndarray = Vt[rank:].T
         return basis
 

@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from symdyn.runtime.complementarity import lemke
-from symdyn.runtime.shared_forces import DEPENDENT, MARGIN, Cone, shared_forces
+from symdyn.runtime.shared_forces import MARGIN, Cone, least_solution, shared_forces
+from symdyn.thresholds import DEPENDENT
 
 OPEN, STICKING, SLIDING = "open", "sticking", "sliding"
 # Inequalities hold to this part of the sizes of what stands in them.
@@ -164,7 +165,7 @@ def moves_with(D: np.ndarray, row: int, held: Sequence[int]) -> bool:
     if not held:
         return False
     along = D[held, row]
-    left = D[row, row] - along @ np.linalg.lstsq(D[np.ix_(held, held)], along, rcond=DEPENDENT)[0]
+    left = D[row, row] - along @ least_solution(D[np.ix_(held, held)], along)
     return bool(left <= KEPT * D[row, row])
 
 
@@ -707,7 +708,7 @@ def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequ
     for _ in range(STEPS):
         values, along = across(np.vstack([angles, angles + SMALL_ANGLE * np.eye(len(places))]))
         slope = (values[1:] - values[0]).T / SMALL_ANGLE
-        step = np.linalg.lstsq(slope, -values[0], rcond=DEPENDENT)[0]
+        step = least_solution(slope, -values[0])
         last, size = size, float(np.abs(step).max())
         if size > 1.0:
             return None

@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Singular values below this part of the largest: rows that depend on each other.
-DEPENDENT = 1e-10
+from symdyn.thresholds import DEPENDENT
+
 # The margin by the bounds, above which contacts hold; steps of Newton's method that are rounding.
 MARGIN, EXACT = 1e-11, 1e-12
 # A margin above this part that softness does not come to: how contacts share forces is not decided.
@@ -77,6 +77,12 @@ class _Null(NamedTuple):
 
     lam_0: np.ndarray
     N: np.ndarray
+
+
+def least_solution(A: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The least x with A x = right, as well as it can be: rows of A may depend on each other."""
+    result: np.ndarray = np.linalg.lstsq(A, right, rcond=DEPENDENT)[0]
+    return result
 
 
 def shared_forces(A: np.ndarray, right: np.ndarray, H: np.ndarray, fixed: np.ndarray, sizes: np.ndarray,
@@ -201,7 +207,7 @@ def _polished(parts: _Parts, v: np.ndarray, worth: np.ndarray,
             F[:n] += w[j] * slope
             F[n + j] = u[0] - size
             J[:n, n + j], J[n + j, :n] = slope, slope
-        step = np.linalg.lstsq(J, -F, rcond=DEPENDENT)[0]
+        step = least_solution(J, -F)
         result, w = result + step[:n], w + step[n:]
         if float(np.abs(step).max()) <= EXACT:
             return (result, w) if (w >= 0).all() and _distances(parts.at(result)).min() >= -EXACT else None

@@ -24,7 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.runtime.contact_laws import DEPENDENT, SLIDING, STICKING, Mode, Site, Solved
+from symdyn.runtime.contact_laws import SLIDING, STICKING, Mode, Site, Solved
+from symdyn.runtime.shared_forces import least_solution
+from symdyn.thresholds import DEPENDENT
 
 # Pieces of an impact: slip before it stops, after that, each of compression and expansion, and again where friction jams.
 MOST_PIECES = 12
@@ -135,7 +137,7 @@ class _InSpace:
     def _begins(self) -> tuple[np.ndarray, np.ndarray]:
         """Friction for each normal impulse where nothing slips, and the direction in which slip begins, zero where it sticks."""
         D_T, across = self.D[1:, 1:], self.D[1:, 0]
-        holds = np.linalg.lstsq(D_T, -across, rcond=DEPENDENT)[0]
+        holds = least_solution(D_T, -across)
         if np.hypot(*holds) <= self.site.static and np.abs(D_T @ holds + across).max() <= DEPENDENT * np.abs(self.D).max():
             return holds, np.zeros(2)
         from scipy.optimize import brentq

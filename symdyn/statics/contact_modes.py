@@ -12,6 +12,7 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, SHARED, SOFTNESS, numbers, rows_of
 from symdyn.shown import shown
+from symdyn.thresholds import DEPENDENT
 
 if TYPE_CHECKING:
     from symdyn.backend.metadata import ContactRecord
@@ -23,8 +24,6 @@ MODES = (OPEN, STICKING, SLIDING)
 TOUCHING = 1e-9
 # Slips below this part of the largest rate have no direction.
 NO_SPEED = 1e-11
-# Singular values below this part of the largest: rows that depend on each other.
-DEPENDENT = 1e-10
 
 
 def asked_modes(module: Module, given: Any) -> dict[str, Any]:

@@ -24,9 +24,11 @@ from symdyn.runtime.consistent import normalised
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import Numbers, numbers, rows_of
 from symdyn.runtime.masses import real_parameters
+from symdyn.runtime.shared_forces import least_solution
 from symdyn.shown import name_of, shown
-from symdyn.statics.contact_modes import DEPENDENT, asked_modes, held_places, with_modes
+from symdyn.statics.contact_modes import asked_modes, held_places, with_modes
 from symdyn.statics.equilibrium import given_inputs
+from symdyn.thresholds import DEPENDENT
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -280,7 +282,7 @@ def _onto(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.nda
         at = numbers(module, t, x, p, inputs)
         if not closed or np.abs(at.gap[closed]).max() <= 1e-14 * max(1.0, float(np.abs(x).max())):
             break
-        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[closed], rcond=DEPENDENT)[0]
+        push = least_solution(at.D[np.ix_(normal, normal)], -at.gap[closed])
         x[:n_q] += at.coordinates[:, normal] @ push
     return normalised(module, x)
 
@@ -361,7 +363,7 @@ class _Forces:
         if not self.held:
             return
         D = at.D[np.ix_(self.held, self.held)]
-        self.best[self.held] = np.linalg.lstsq(D, -at.free[self.held], rcond=DEPENDENT)[0]
+        self.best[self.held] = least_solution(D, -at.free[self.held])
         self.size = float(np.abs(self.best).max()) or 1.0
         _, values, Vt = np.linalg.svd(D)
         self.free = np.zeros((n, int((values <= DEPENDENT * values[0]).sum())))

@@ -16,6 +16,7 @@ from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.contact_laws import Site
 from symdyn.runtime.integrating import contacts, hybrid
+from symdyn.thresholds import DEPENDENT
 from tests.derivatives.test_periodic_contacts import after_heel_strike, walker
 from tests.helpers import swept
 from tests.runtime.test_rigid_contact import G, ball, planar
@@ -34,7 +35,7 @@ def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str
     excluded = np.array([sum(1 << hybrid.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
     coefficients = np.array([[s.static, s.kinetic, 0.0 if s.slip is None or not len(s.slip) else s.slip[0]] for s in sites])
     mode, answer = np.zeros(n, dtype=np.intc), np.zeros(n + 2 * len(b))
-    tolerances = np.array([laws.NOISE, laws.DEPENDENT, laws.DIFFERENT])
+    tolerances = np.array([laws.NOISE, DEPENDENT, laws.DIFFERENT])
     arrays = [rows, excluded, coefficients, np.ascontiguousarray(D), b, tolerances, mode, answer]
     found = hybrid_in_c().symdyn_hybrid_modes(n, *[ctypes.c_void_p(a.ctypes.data) for a in arrays])
     return found, [hybrid.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]

@@ -18,7 +18,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.inputs.inputs import not_finite
 from symdyn.runtime.integrating.chatter import STEPS, chatter_of
-from symdyn.runtime.integrating.events import CHATTER, Happened, at_once, ended, entangled, not_known, not_proved, too_quick
+from symdyn.runtime.integrating.events import Happened, at_once, ended, entangled, not_known, not_proved, too_quick
 from symdyn.runtime.integrating.interrupts import Interrupts
 from symdyn.runtime.integrating.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.integrating.outcome import Outcome, Request
@@ -27,6 +27,7 @@ from symdyn.runtime.integrating.short_steps import ShortSteps
 from symdyn.runtime.integrating.stabilization import Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
+from symdyn.thresholds import CHATTER
 
 if TYPE_CHECKING:
     from symdyn.runtime.building.library import CLibrary

@@ -42,6 +42,7 @@ from symdyn.runtime.integrating.slip_begins import LARGER, LONGEST, SHORTEST, TO
 from symdyn.runtime.integrating.slip_begins import ROUNDED as RESOLVED
 from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
+from symdyn.runtime.shared_forces import least_solution
 from symdyn.runtime.stronge import stronge
 
 if TYPE_CHECKING:
@@ -172,12 +173,12 @@ def onto_rows(of: Callable[[np.ndarray], Numbers], x: np.ndarray, gaps: Mapping[
     at, normal, x = of(x), list(gaps.values()), x.copy()
     n_q, n_u = len(at.coordinates), len(at.speeds)
     if gaps:
-        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[list(gaps)], rcond=1e-10)[0]
+        push = least_solution(at.D[np.ix_(normal, normal)], -at.gap[list(gaps)])
         if np.abs(push).max(initial=0.0) > 0:
             x[:n_q] += at.coordinates[:, normal] @ push
             at = of(x)
     if held:
-        stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
+        stop = least_solution(at.D[np.ix_(held, held)], -at.slip[held])
         x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
     return x
 
@@ -228,7 +229,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
         if not below:
             break
         places = [first[k] for k in below]
-        push = np.linalg.lstsq(now.D[np.ix_(places, places)], -now.gap[below], rcond=1e-10)[0]
+        push = least_solution(now.D[np.ix_(places, places)], -now.gap[below])
         moved[:n_q] += now.coordinates[:, places] @ push
     depths = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
     names = module.metadata.q
@@ -1316,7 +1317,7 @@ class _Phases:
         if not columns:
             return x
         H, G = np.array(columns).T[places], np.array(kept)[:, places]
-        impulse = H @ np.linalg.lstsq(G @ at.D[np.ix_(places, places)] @ H, -G @ at.slip[places], rcond=1e-10)[0]
+        impulse = H @ least_solution(G @ at.D[np.ix_(places, places)] @ H, -G @ at.slip[places])
         n_q, n_u, x = len(at.coordinates), len(at.speeds), x.copy()
         x[n_q:n_q + n_u] += at.speeds[:, places] @ impulse
         return x

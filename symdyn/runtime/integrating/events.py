@@ -12,15 +12,12 @@ from symdyn.contact_kinds import RELEASES, TOUCHES
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.integrating.stabilization import Projector
 from symdyn.shown import LENGTH, name_of
+from symdyn.thresholds import AT_ONCE, CHATTER, MOST_RESETS
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 EVENTS, RESETS, BOUNDS, RANGES = "events", "event_resets", "event_bounds", "event_ranges"
-# Events closer than this part of the span of the run happen at one time.
-AT_ONCE = 1e-14
-# So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
-CHATTER, MOST_RESETS = 1e-10, 5
 
 Between = Callable[[float], np.ndarray]
 

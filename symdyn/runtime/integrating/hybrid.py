@@ -27,6 +27,7 @@ from symdyn.runtime.integrating.compiled import FAR, Problem
 from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.stabilization import Corrections
+from symdyn.thresholds import DEPENDENT
 
 if TYPE_CHECKING:
     from symdyn.backend.metadata import ContactRecord
@@ -139,7 +140,7 @@ class Motion:
         self.record = record = Record(
             n_q=sizes.q, n_u=sizes.u, n_state=sizes.x, n_x=n_x, n_p=self.n_p, n_contacts=n, n_rows=n_rows, n_events=n_events,
             most_steps=MOST_STEPS, most_phases=MOST_PHASES, most_happened=4 * MOST_PHASES + 2 * n_events,
-            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=laws.DEPENDENT, different=laws.DIFFERENT, far=FAR,
+            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=DEPENDENT, different=laws.DIFFERENT, far=FAR,
             tolerated=slip_begins.TOLERATED, rounded=slip_begins.ROUNDED, shortest=slip_begins.SHORTEST, guess=slip_begins.GUESS,
             longest=slip_begins.LONGEST, grows=slip_begins.GROWS, larger=slip_begins.LARGER, guesses=slip_begins.GUESSES)
         index = {name: k for k, name in enumerate(metadata.parameters)}
