@@ -27,9 +27,10 @@ REGULAR, SINGULAR_FALLBACK = "regular", "singular"
 # takes 3 to 8 % less time in a pendulum of five links, and more in longer ones.
 INLINE = 200
 
-# Statements that loops save at least where nobody asks for them. Measured with gcc 12: 1500 statements take 0.4 s to compile, and
-# where loops save them, they run as fast as the statements; below, calls of the loops cost up to a tenth of the time.
-LEAST_SAVED = 1500
+# Seconds that a statement takes to compile, measured with gcc 12, and the seconds that loops save at least where nobody asks for
+# them: loops that save as much run as fast as the statements; below, their calls cost up to a tenth of the time.
+STATEMENT_SECONDS, LEAST_SECONDS = 0.4 / 1500, 0.4
+LEAST_SAVED = round(LEAST_SECONDS / STATEMENT_SECONDS)
 Rolls = Callable[[str, int], int | None]
 
 
@@ -89,8 +90,8 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     singular_fallback   function name -> the tape for where the first one fails
     like        the same in another dialect, whose rounding this one is to have
     columns     Jacobians whose tapes are derivatives along directions; vectors: the dialect of these
-    rolled      whether what functions repeat becomes loops: "auto" where that saves LEAST_SAVED statements, True wherever it can
-                be; where `like` is given, in those functions that it has loops in
+    rolled      whether repeated statements become loops: "auto" where that saves LEAST_SECONDS of compilation, True wherever they
+                can; where `like` is given, in those functions that it has loops in
     """
     singular_fallback, columns = singular_fallback or {}, columns or {}
     first = next(iter(tapes.values()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from symdyn.backend.program import STATEMENT_SECONDS
 from symdyn.backend.source import Source
 from symdyn.choice import HEADING, Candidate
 from symdyn.counting import counted
@@ -45,9 +46,15 @@ class RolledRow:
     statements: int
     size: int
 
+    @property
+    def seconds_saved(self) -> float:
+        """Predicted seconds of compilation without the statements that loops replace, by which loops are chosen."""
+        return (self.statements - self.written) * STATEMENT_SECONDS
+
     def __str__(self) -> str:
         return (f"{self.function}: {counted(self.loops, 'loop')} of {self.trips} trips in all; {self.written} statements are "
-                f"written in place of {self.statements}; {self.size} bytes of code with all other functions")
+                f"written in place of {self.statements}, which saves {self.seconds_saved:.2g} s of compilation by prediction; "
+                f"{self.size} bytes of code with all other functions")
 
 
 @dataclass(frozen=True)

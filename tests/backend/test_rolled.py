@@ -20,7 +20,7 @@ from symdyn.backend import source as rendering
 from symdyn.backend.dialect import Dialect
 from symdyn.backend.function import Function
 from symdyn.backend.like_parts import Loop, find_loops
-from symdyn.backend.program import LEAST_SAVED, Program, build
+from symdyn.backend.program import LEAST_SAVED, LEAST_SECONDS, STATEMENT_SECONDS, Program, build
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source, render
 from symdyn.errors import EvaluationError, SymdynError
@@ -239,6 +239,7 @@ def test_the_report_names_loops() -> None:
         (f.name, len(f.loops), sum(f.loops)) for f in (made.prologue, made.functions[0])]
     assert f"rhs: {rows[1].loops} loops of {rows[1].trips} trips in all; {rows[1].written} statements are written" in str(
         equations.compile(backend="c", rolled=True).report())
+    assert rows[1].seconds_saved == (rows[1].statements - rows[1].written) * STATEMENT_SECONDS < LEAST_SECONDS
     assert not equations.compile(backend="c").report().rolled
 
 

@@ -98,7 +98,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_part_is_there(text: str, written: tuple[Path, list[str]]) -> None:
     assert "could not be made" not in text and "not made" not in text
     assert all(f'<section id="{name}">' in text and f'<a href="#{name}">' in text for name in PARTS)
-    assert [t for t in written[1] if "s left" not in t] == ["equations", "equations of motion", "what is generated",
+    assert [t for t in written[1] if "s left" not in t] == ["equations", "equations of motion", "generated code",
                                                            "condition along the motion", "work against error",
                                                            "stability under stress", "proof by identities"]
 
