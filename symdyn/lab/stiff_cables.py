@@ -52,7 +52,7 @@ HEADING = (f"{'links':>6}{'states':>8}{'entries':>9}{'derive s':>10}{'method':>9
 
 
 REST_HEADING = (f"{'links':>6}{'sag m':>14}{'off':>10}{'shape off':>11}{'deep sag m':>14}{'off':>10}{'shape off':>11}"
-                "   frequencies rad/s: of the links, off; their limit, off")
+                "   frequencies rad/s: of the links, off, off those of knots; their limit, off")
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ class Rest:
     they differ from closed forms by, relative.
 
     shape_error, deep_shape_error   the largest distance of a knot from its place on the elastic catenary, over the cable's length
-    own     frequencies of these links; limit: of many links, from these and from those of half as many
+    own     frequencies of these links; knots_errors: compared with those that masses at knots have by Irvine's, see `of_knots`
+    limit   frequencies of many links, from these and from those of half as many
     """
 
     links: int
@@ -73,18 +74,21 @@ class Rest:
     deep_shape_error: float
     own: tuple[float, ...]
     own_errors: tuple[float, ...]
+    knots_errors: tuple[float, ...]
     limit: tuple[float, ...]
     limit_errors: tuple[float, ...]
 
     @property
     def bounded(self) -> tuple[float, ...]:
-        """Errors that are to be within BOUND; those of frequencies of links are of second order in 1/n."""
-        return self.sag_error, self.shape_error, self.deep_sag_error, self.deep_shape_error, *self.limit_errors
+        """Errors that are to be within BOUND; frequencies of links differ from Irvine's by terms of second order in 1/n."""
+        return (self.sag_error, self.shape_error, self.deep_sag_error, self.deep_shape_error, *self.knots_errors,
+                *self.limit_errors)
 
     def __str__(self) -> str:
         """A line under REST_HEADING."""
-        each = zip(self.own, self.own_errors, self.limit, self.limit_errors, strict=True)
-        frequencies = "".join(f"{own:>12.6f}{off:>9.1e}{limit:>12.6f}{error:>9.1e}" for own, off, limit, error in each)
+        each = zip(self.own, self.own_errors, self.knots_errors, self.limit, self.limit_errors, strict=True)
+        frequencies = "".join(f"{own:>12.6f}{off:>9.1e}{knots:>9.1e}{limit:>12.6f}{error:>9.1e}"
+                              for own, off, knots, limit, error in each)
         return (f"{self.links:>6}{self.sag:>14.10f}{self.sag_error:>10.1e}{self.shape_error:>11.1e}{self.deep_sag:>14.10f}"
                 f"{self.deep_sag_error:>10.1e}{self.deep_shape_error:>11.1e}{frequencies}")
 
@@ -277,9 +281,17 @@ def irvine(H: float, stiffness: float = EA, count: int = 5) -> np.ndarray:
     return np.sort(result)[:count] * math.sqrt(H)
 
 
+def of_knots(frequency: np.ndarray, H: float, links: int) -> np.ndarray:
+    """Frequencies of a taut string whose mass stands at the knots of so many links, from those of the uniform string, rad/s:
+    waves run along it with the frequency 2 n c sin(kappa / (2 n)), kappa = frequency / c the wave number and c the speed of waves
+    (Lagrange; Rayleigh, The Theory of Sound, section 120)."""
+    c = math.sqrt(H)
+    return 2 * links * c * np.sin(frequency / (2 * links * c))
+
+
 def compare(n: int) -> Rest:
     """Cables at rest compared with the elastic catenary, and a taut one with Irvine's frequencies: those of n links are off by
-    the square of 1/n, which half as many links show and which is taken off. Irvine's suppose little sag: those of a cable with
+    the square of 1/n, as masses at knots are, and as half as many links show. Irvine's suppose little sag: those of a cable with
     deep sag are not compared."""
     H, sag = elastic_catenary(TAUT_EA, TAUT)
     count = min(5, n // 2 - 1)  # half as many links have one less across the cable than there are links
@@ -291,7 +303,8 @@ def compare(n: int) -> Rest:
     rest = 1 / (1 + TAUT / TAUT_EA)
     deep, deep_shape_error = _deep(n)
     return Rest(n, _sag(q), abs(_sag(q) / sag - 1), _astray(q, H, rest, TAUT_EA), deep, abs(deep / DEEP - 1), deep_shape_error,
-                tuple(result[1].tolist()), tuple(np.abs(result[1] / exact - 1).tolist()), tuple(limit.tolist()),
+                tuple(result[1].tolist()), tuple(np.abs(result[1] / exact - 1).tolist()),
+                tuple(np.abs(result[1] / of_knots(exact, H, n) - 1).tolist()), tuple(limit.tolist()),
                 tuple(np.abs(limit / exact - 1).tolist()))
 
 

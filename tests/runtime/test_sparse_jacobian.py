@@ -145,6 +145,8 @@ def test_errors_of_cables_of_links_are_of_second_order(capsys: pytest.CaptureFix
     own, limit = np.array(many.own_errors), np.array(many.limit_errors)
     assert own == pytest.approx(np.array(few.own_errors) / 4, rel=0.05) and (limit < own / 10).all()
     assert len(stiff_cables.compare(10).limit) == 4 and few.bounded[-5:] == few.limit_errors
+    assert max(*few.knots_errors, *many.knots_errors) < 1e-6  # a taut string with its mass at knots, Lagrange's closed form
+    assert few.bounded[4:9] == few.knots_errors
 
 
 def test_shapes_that_are_not_found_raise(cable: Any, monkeypatch: pytest.MonkeyPatch) -> None:

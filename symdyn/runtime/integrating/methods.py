@@ -88,7 +88,7 @@ def _implicit(stages: int) -> Callable[[Module, Inputs | None], str]:
             if size <= LARGEST_MATRICES:
                 return ""
         instead = ("'Radau' of SciPy, whose factors have few entries here" if there is not None and there.sparse else
-                   f"'{DEFAULT}'")
+                   f"'{DEFAULT}', or masses joined by springs and dampers alone, which have banded matrices, in place of joints")
         return f"its matrices of {n} states take {size / 2**30:.1f} GiB; use method={instead}"
 
     return unfit
