@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar, overload
 
 import numpy as np
 
@@ -72,13 +72,17 @@ _WHOLE = 2**53
 _OF_MULTIPLIERS = ("lam", "reactions", "cut_loads")
 
 
-class Jacobian(NamedTuple):
+# An array where all parts are requested, else perhaps None.
+_Part = TypeVar("_Part", bound=np.ndarray | None, covariant=True)
+
+
+class Jacobian(NamedTuple, Generic[_Part]):
     """Derivatives of a function by the state (..., n_x), the inputs (..., n_in) and the parameters (..., n_p); None for what was
     not requested. Before the last axis stands the shape of the function: of x_dot (n_x,)."""
 
-    x: np.ndarray | None = None
-    inputs: np.ndarray | None = None
-    params: np.ndarray | None = None
+    x: _Part
+    inputs: _Part
+    params: _Part
 
 
 class FurtherDerivatives(NamedTuple):
@@ -89,6 +93,10 @@ class FurtherDerivatives(NamedTuple):
     params: np.ndarray | None = None
     t: np.ndarray | None = None
     ud: np.ndarray | None = None
+
+
+def _jacobian(parts: Mapping[str, np.ndarray]) -> Jacobian[np.ndarray | None]:
+    return Jacobian(*map(parts.get, Jacobian._fields))
 
 
 _BY = "x, inputs, params, t and ud"
@@ -414,9 +422,18 @@ class Module:
         """
         return self.split_outputs(self.evaluate("outputs", t, x, params, inputs))
 
+    @overload
+    def jacobian(self, t: Times, x: States, params: States | None = None, inputs: States | None = (), *, of: str = "rhs",
+                 ud: States = ()) -> Jacobian[np.ndarray]: ...
+
+    @overload
     def jacobian(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
                  wrt: Sequence[str] = ("x", "inputs", "params"), of: str = "rhs",
-                 ud: States = ()) -> Jacobian | FurtherDerivatives:
+                 ud: States = ()) -> Jacobian[np.ndarray | None] | FurtherDerivatives: ...
+
+    def jacobian(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
+                 wrt: Sequence[str] = ("x", "inputs", "params"), of: str = "rhs",
+                 ud: States = ()) -> Jacobian[np.ndarray | None] | FurtherDerivatives:
         """Exact derivatives of a function, by default of x_dot, by state, inputs and parameters.
 
         wrt   by what: of "x", "inputs", "params", "t" (the others held), "ud" (accelerations, of functions that take them)
@@ -451,7 +468,7 @@ class Module:
         result = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
         if of in _OF_MULTIPLIERS:
             self._demand_unique_multipliers(of, t, x, params)
-        return FurtherDerivatives(**result) if {"t", "ud"}.intersection(wrt) else Jacobian(**result)
+        return FurtherDerivatives(**result) if {"t", "ud"}.intersection(wrt) else _jacobian(result)
 
     def _demand_unique_multipliers(self, of: str, t: Times, x: States, params: States | None) -> None:
         """Raises EvaluationError where the motion does not determine all multipliers.
@@ -470,8 +487,16 @@ class Module:
                                   "that system.diagnose() lists, or differentiate accelerations, which the choice does not "
                                   "change")
 
+    @overload
+    def adjoint(self, t: Times, x: States, weights: States, params: States | None = None,
+                inputs: States | None = ()) -> Jacobian[np.ndarray]: ...
+
+    @overload
     def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
-                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian | FurtherDerivatives:
+                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian[np.ndarray | None] | FurtherDerivatives: ...
+
+    def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
+                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian[np.ndarray | None] | FurtherDerivatives:
         """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs, parameters and time, at the cost of about
         two evaluations of x_dot.
 
@@ -487,7 +512,7 @@ class Module:
         self._weighted(wrt, "adjoint")
         given = self._with_weights(weights, (), 0)
         result = {w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt}
-        return FurtherDerivatives(**result) if "t" in wrt else Jacobian(**result)
+        return FurtherDerivatives(**result) if "t" in wrt else _jacobian(result)
 
     def hessian(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
                 wrt: Sequence[str] = ("x",), along: States | None = None) -> np.ndarray:
