@@ -116,7 +116,7 @@ class _Examination:
         """For every row the loop or constraint that it belongs to."""
         owners = list(self.names)
         for closure in self.gathered.closures:
-            for index in closure.places:
+            for index in closure.indices:
                 owners[index] = closure.joint.name
         return owners
 
@@ -205,7 +205,7 @@ class _Examination:
         return np.concatenate([here[None], others])[:STATES + 1]
 
     def _scaled(self, result: AtStates) -> tuple[Scaled, list[int]]:
-        """Scales that hold for all states, and the places of those with the largest rank."""
+        """Scales that hold for all states, and the indices of those with the largest rank."""
         rows = np.median(result.C_scale[1:] if len(result.C_scale) > 1 else result.C_scale, axis=0)
         raw = Scaled(self.states, rows, 1.0, 0).of(result)
         sizes = np.linalg.svd(raw, compute_uv=False)
@@ -247,7 +247,7 @@ class _Examination:
                            "become unique. As long as redundant rows are there, those of least norm are given")
         for closure in self.gathered.closures:
             joint = closure.joint
-            turns = [k for k in closure.places if _turning(self.names[k])]
+            turns = [k for k in closure.indices if _turning(self.names[k])]
             trivial = sum(name.startswith(f"{joint.name}_") and _turning(name) for name in self.gathered.trivial)
             rest = [k for k in range(len(self.names)) if k not in turns]
             if joint.kind not in ("revolute", "fixed") or self.model.planar or not (turns or trivial):

@@ -59,10 +59,10 @@ def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
 
 def event_leaves(equations: Equations) -> list[int]:
     """Arguments of the events that can be enclosed: 0 for t, then the entries of x = [q; u; z], then the inputs."""
-    places = {name: k for k, name in enumerate(_leaf_names(equations))}
+    indices = {name: k for k, name in enumerate(_leaf_names(equations))}
     ways = [equations] if equations.singular_fallback is None else [equations, equations.singular_fallback]
     values = [entry for way in ways for entry in _values(way, enclosed(equations))]
-    return sorted({places[leaf.args[1]] for leaf in _moving(values)})
+    return sorted({indices[leaf.args[1]] for leaf in _moving(values)})
 
 
 def bound_names(leaves: Sequence[int]) -> list[str]:
@@ -75,10 +75,10 @@ def event_bounds(equations: Equations, name: str) -> Tape:
     (n_e, 2), of the values alone, with the rounding of their operations; of those that cannot be enclosed zeros."""
     recorder, can = equations.recorder, enclosed(equations)
     values = _values(equations, can)
-    places = {name: k for k, name in enumerate(_leaf_names(equations))}
+    indices = {name: k for k, name in enumerate(_leaf_names(equations))}
 
     def jet(leaf: Node) -> Jet:
-        ends = [recorder.leaf(name, ACCELERATION) for name in bound_names([places[leaf.args[1]]])]
+        ends = [recorder.leaf(name, ACCELERATION) for name in bound_names([indices[leaf.args[1]]])]
         return Jet(*[Interval(*ends[k:k + 2]) for k in (0, 2, 4)])
 
     with recorder.section("bounds of the events"):

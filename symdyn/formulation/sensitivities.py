@@ -31,7 +31,7 @@ def direction_names(symbols: Symbols) -> list[str]:
                                                 *symbols.parameters)]
 
 
-def places_of_resets(symbols: Symbols | Motion, events: Sequence[Any]) -> list[int]:
+def indices_of_resets(symbols: Symbols | Motion, events: Sequence[Any]) -> list[int]:
     """Entries of [q; u] that events reset, in order."""
     reset = {symbol for event in events for symbol, _ in event.reset}
     return [k for k, symbol in enumerate((*symbols.coordinates, *symbols.speeds)) if symbol in reset]

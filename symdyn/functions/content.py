@@ -82,7 +82,7 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
                    [[q.name for q in group] for group in equations.unit_groups], singular_fallback,
                    event_records(equations) if "events" in names else (),
-                   _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
+                   _leaf_indices(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
                    len(right_side.sensitivities), None if right_side.adjoint is None else len(right_side.adjoint),
                    {name: replace(made, tape=tapes[name]) for name, made in several.items()},
                    tuple(name for name in names if second_named(name) and name not in several),
@@ -134,15 +134,15 @@ def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ..
 def event_records(equations: Equations) -> tuple[EventRecord, ...]:
     """Events as plain data."""
     symbols = equations.symbols
-    places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
+    indices = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
     about = zip(equations.events, enclosed(equations), unproved(equations), unknowns(equations), strict=True)
-    return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
+    return tuple(EventRecord(e.name, e.direction, e.stop, tuple(indices[s] for s, _ in e.reset), can, tuple(inputs),
                              tuple(functions), why) for e, can, why, (inputs, functions) in about)
 
 
 def _group_records(equations: Equations) -> tuple[GroupRecord, ...]:
-    places = {u: k for k, u in enumerate(equations.symbols.speeds)}
-    return tuple(GroupRecord(g.name, tuple(s.body for s in g.spheres), tuple(places[u] for s in g.spheres for u in s.speeds),
+    indices = {u: k for k, u in enumerate(equations.symbols.speeds)}
+    return tuple(GroupRecord(g.name, tuple(s.body for s in g.spheres), tuple(indices[u] for s in g.spheres for u in s.speeds),
                              len(g.planes)) for g in equations.contact_groups)
 
 
@@ -157,7 +157,7 @@ def closed_names(equations: Equations) -> list[str]:
     return list(dict.fromkeys(s.name for c in equations.contacts for s in (*c.switches, *c.sliding)))
 
 
-def _leaf_places(equations: Equations, n_x: int) -> list[int]:
+def _leaf_indices(equations: Equations, n_x: int) -> list[int]:
     """Indices of the leaves that bound events, see `event_leaves`, where x has n_x entries, of which the last ones may be those
     of the run."""
     symbols = equations.symbols

@@ -14,7 +14,7 @@ import numpy as np
 from symdyn.backend.columns import Group, MotionColumns
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
-from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
+from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import reverse, seed_name
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, SEED, STATE
@@ -53,7 +53,7 @@ def functions_of(equations: Equations) -> tuple[str, ...]:
 def given_to_carry(equations: Equations, sensitivities: Sequence[str]) -> list[str]:
     """Names of what CARRIED takes besides the state after a reset and the columns that are wanted: jumps of the speeds, impulses,
     and by how much the event comes later along every column."""
-    held = places_of_resets(equations.symbols, equations.events)
+    held = indices_of_resets(equations.symbols, equations.events)
     return [*carried_names(equations.symbols.speeds, len(held)), *_later_names(sensitivities)]
 
 
@@ -150,9 +150,9 @@ def _with(equations: Equations, quantity: str, column: dict[str, Any], later: An
 def _normal(equations: Equations, column: dict[str, Any]) -> dict[str, Any]:
     """The column without changes of the length of what has unit length."""
     symbols, x = equations.symbols, list(column["x"])
-    places = {s: k for k, s in enumerate(symbols.coordinates)}
+    indices = {s: k for k, s in enumerate(symbols.coordinates)}
     for group in equations.unit_groups:
-        unit, at = [equations.leaves[q] for q in group], [places[q] for q in group]
+        unit, at = [equations.leaves[q] for q in group], [indices[q] for q in group]
         longer = sum((e * x[k] for e, k in zip(unit, at, strict=True)), 0)
         for e, k in zip(unit, at, strict=True):
             x[k] = x[k] - e * longer

@@ -29,7 +29,7 @@ from symdyn.formulation.derivatives import (
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
-from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, places_of_resets
+from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
 from symdyn.functions import sensitivities as columns
 from symdyn.functions.packed import packed_tape, pattern
 from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
@@ -203,7 +203,7 @@ def given_rates(equations: Equations, names: Sequence[str], sensitivities: Seque
     if "outputs_sensitivity" in names:
         return direction_names(symbols)
     if "carried_variation" in names:
-        held = places_of_resets(symbols, equations.events)
+        held = indices_of_resets(symbols, equations.events)
         return [*carried_names(symbols.speeds, len(held)), LATER, *direction_names(symbols)]
     given = [f"{s.name}_dot" for s in symbols.speeds]
     if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):

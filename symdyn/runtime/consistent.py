@@ -55,12 +55,12 @@ class NotConsistent(ArgumentError):
 def normalised(module: Module, x: np.ndarray) -> np.ndarray:
     """The state with unit vectors of length 1; raises ArgumentError if they are off by more than rounding of input."""
     for group in module.metadata.unit_groups:
-        places = [module.metadata.x.index(name) for name in group]
-        norm = float(np.linalg.norm(x[places]))
+        indices = [module.metadata.x.index(name) for name in group]
+        norm = float(np.linalg.norm(x[indices]))
         if abs(norm - 1) > 1e-6:
             raise ArgumentError(f"{module.name}: initial q: {', '.join(group)} have the norm {norm:.6g}, not 1; Euler parameters "
                                 "are a unit vector: divide them by their norm")
-        x[places] /= norm
+        x[indices] /= norm
     return x
 
 
@@ -233,9 +233,9 @@ class _Search:
         moved[:self.n_q] += self._evaluate("N", x) @ dv
         moved[self.kept_q] = x[self.kept_q]
         for group in self.module.metadata.unit_groups:
-            places = [self.module.metadata.x.index(name) for name in group]
-            if not set(places) & set(self.kept_q):
-                moved[places] /= np.linalg.norm(moved[places])
+            indices = [self.module.metadata.x.index(name) for name in group]
+            if not set(indices) & set(self.kept_q):
+                moved[indices] /= np.linalg.norm(moved[indices])
         return moved
 
     def _step(self, x: np.ndarray) -> np.ndarray | None:

@@ -50,7 +50,7 @@ FACETS, COVERS = 8, 5
 class Site:
     """One contact of a problem.
 
-    rows       places of its normal row and its tangential ones; of dry friction with given bounds that of its one row
+    rows       indices of its normal row and its tangential ones; of dry friction with given bounds that of its one row
     static, kinetic   coefficients of friction
     slip       unit vector of the slip that it has; None: it does not slip, and may stick or begin to slide
     least      a normal force that acts in every case: the impulse of expansion
@@ -68,12 +68,12 @@ class Site:
 
     @property
     def normal(self) -> int | None:
-        """The place of its normal row."""
+        """The index of its normal row."""
         return None if self.bounded else self.rows[0]
 
     @property
     def tangents(self) -> list[int]:
-        """The places of its tangential rows."""
+        """The indices of its tangential rows."""
         return list(self.rows if self.bounded else self.rows[1:])
 
     def limit(self, lam: np.ndarray) -> Any:
@@ -412,7 +412,7 @@ class _Table:
         return Solved(modes, result.lam, w, True, result.softness, result.softness is None)
 
     def _only(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """H, fixed and the places of the active unknowns of the only combination."""
+        """H, fixed and the indices of the active unknowns of the only combination."""
         H, fixed = (np.sum([of[0] for of in parts], axis=0) for parts in (self.H, self.fixed))
         return H, fixed, np.flatnonzero(np.any([of[0] for of in self.active], axis=0))
 
@@ -423,17 +423,17 @@ class _Table:
 
         H, _, active = self._only()
         _, s, V = np.linalg.svd((self.D @ H)[np.ix_(active, active)])
-        places = [k for k, (site, (mode,)) in enumerate(zip(self.sites, self.options, strict=True))
+        indices = [k for k, (site, (mode,)) in enumerate(zip(self.sites, self.options, strict=True))
                   if site.normal is not None and mode.held]
-        normals, force = [self.sites[k].rows[0] for k in places], float(np.abs(lam).max(initial=0.0))
+        normals, force = [self.sites[k].rows[0] for k in indices], float(np.abs(lam).max(initial=0.0))
         free = H[normals][:, active] @ V[s <= DEPENDENT * s[:1]].T
-        if not places or not force or float(lam[normals].min()) > NOISE * force:
+        if not indices or not force or float(lam[normals].min()) > NOISE * force:
             return []
         # As many forces as can be: the largest sum of parts from 0 to 1, in LIGHT of the largest force, that are below them.
-        (n, m), most = free.shape, LIGHT * np.eye(len(places))
+        (n, m), most = free.shape, LIGHT * np.eye(len(indices))
         result = linprog(np.append(np.zeros(m), -np.ones(n)), np.hstack([-free, most]), np.maximum(lam[normals] / force, 0.0),
                          bounds=[(None, None)] * m + [(0, 1)] * n)
-        return [k for k, part in zip(places, result.x[m:].tolist(), strict=True) if part < 0.5] if result.success else []
+        return [k for k, part in zip(indices, result.x[m:].tolist(), strict=True) if part < 0.5] if result.success else []
 
     def solved(self, combinations: Sequence[Sequence[int]]) -> list[Solved | None]:
         """The solution of each combination; None where it breaks an inequality."""
@@ -513,7 +513,7 @@ class _Faceted:
         self.sites = sites
         self.first: dict[int, int] = {}
         columns: list[np.ndarray] = []
-        speeds: list[tuple[int, int, int]] = []  # place of gamma, of the normal force, site
+        speeds: list[tuple[int, int, int]] = []  # indices of gamma and of the normal force, site
         lam_0 = np.zeros(len(b))
         n = 0
         for index, site in enumerate(sites):
@@ -689,15 +689,15 @@ def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
 def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode],
                 unknown: Sequence[int]) -> tuple[Mode, ...] | None:
     """All unknown directions at once by Newton's method from those given; None where it does not converge."""
-    places = list(unknown)
-    tangents = np.array([sites[k].tangents for k in places])
-    angles = np.array([np.arctan2(modes[k].direction[1], modes[k].direction[0]) for k in places])
+    indices = list(unknown)
+    tangents = np.array([sites[k].tangents for k in indices])
+    angles = np.array([np.arctan2(modes[k].direction[1], modes[k].direction[0]) for k in indices])
 
     def across(trials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = np.stack([np.cos(trials), np.sin(trials)], axis=2)
         options: list[list[Mode]] = [[m] for m in modes]
         chosen = np.zeros((len(trials), len(sites)), dtype=int)
-        for i, k in enumerate(places):
+        for i, k in enumerate(indices):
             options[k] = [Mode(SLIDING, one, modes[k].held) for one in d[:, i]]
             chosen[:, k] = range(len(trials))
         w = _Table(D, b, sites, options).linear(chosen)[1][:, tangents]
@@ -706,7 +706,7 @@ def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequ
     scale = float(np.abs(b).max(initial=0.0))
     size = np.inf
     for _ in range(STEPS):
-        values, along = across(np.vstack([angles, angles + SMALL_ANGLE * np.eye(len(places))]))
+        values, along = across(np.vstack([angles, angles + SMALL_ANGLE * np.eye(len(indices))]))
         slope = (values[1:] - values[0]).T / SMALL_ANGLE
         step = least_solution(slope, -values[0])
         last, size = size, float(np.abs(step).max())
@@ -719,7 +719,7 @@ def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequ
     if np.abs(values).max() > NOISE * scale or (along < -NOISE * scale).any():
         return None
     result = list(modes)
-    for k, angle in zip(places, angles, strict=True):
+    for k, angle in zip(indices, angles, strict=True):
         result[k] = Mode(SLIDING, np.array([np.cos(angle), np.sin(angle)]), modes[k].held)
     return tuple(result)
 

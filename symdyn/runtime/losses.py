@@ -103,7 +103,7 @@ def cost_of(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndar
 
 def _of_function(module: Module, what: str, given: Callable[..., Any], by: Sequence[str], p: np.ndarray, compared: bool) -> Cost:
     n_x, n_p = module.metadata.sizes.x, len(p)
-    places = [module.metadata.parameters.index(name) if name in module.metadata.parameters else -1 for name in by]
+    indices = [module.metadata.parameters.index(name) if name in module.metadata.parameters else -1 for name in by]
 
     def one(t: float, x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         returned = called(given, t, x, f"{module.name}: the function for {what} of the loss", (t, x.copy(), p.copy()))
@@ -135,7 +135,7 @@ def _of_function(module: Module, what: str, given: Callable[..., Any], by: Seque
             checked.append(float(t[0]))
             check(float(t[0]), x[0], rows[0][1], rows[0][2][:n_p])
         return _finite(module, what, t, Costs(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]),
-                                              np.array([r[2][places] for r in rows]).reshape(len(rows), len(by))))
+                                              np.array([r[2][indices] for r in rows]).reshape(len(rows), len(by))))
 
     return Cost(all_rows, smooth=False, known=False)
 
@@ -189,12 +189,12 @@ def output_names(module: Module) -> tuple[str, ...]:
 
 
 class _Outputs:
-    """Outputs of a module that an expression holds, by their places among all entries, with their derivatives from its code."""
+    """Outputs of a module that an expression holds, by their indices among all entries, with their derivatives from its code."""
 
-    def __init__(self, module: Module, places: Sequence[int], by: Sequence[str], p: np.ndarray) -> None:
-        self.module, self.places, self.p = module, list(places), p
+    def __init__(self, module: Module, indices: Sequence[int], by: Sequence[str], p: np.ndarray) -> None:
+        self.module, self.indices, self.p = module, list(indices), p
         known = output_names(module)
-        self.names, self.n_y = [known[k] for k in places], len(known)
+        self.names, self.n_y = [known[k] for k in indices], len(known)
         given = (*module.metadata.inputs, *module.metadata.parameters)
         columns = {name: k for k, name in enumerate(given)}
         self.by = [columns[name] for name in by]
@@ -203,18 +203,18 @@ class _Outputs:
         if not self.names:
             return {}
         rows = self.module.evaluate("outputs", t, x, self.p, inputs).reshape(len(t), -1)
-        return dict(zip(self.names, rows[:, self.places].T, strict=True))
+        return dict(zip(self.names, rows[:, self.indices].T, strict=True))
 
     def folded(self, slopes: np.ndarray, t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """From slopes (n, k, ...) by the state, by the others and by these outputs to those by the time, which these outputs
         make, by the state and by the others, (n, k, 1 + n_x + n_by)."""
         n = len(t)
         J: Any = self.module.jacobian(t, x, self.p, inputs, ["t", "x", "inputs", "params"], "outputs")
-        part = lambda rows: np.asarray(rows).reshape(n, self.n_y, np.shape(rows)[-1])[:, self.places]
+        part = lambda rows: np.asarray(rows).reshape(n, self.n_y, np.shape(rows)[-1])[:, self.indices]
         others = np.concatenate([part(J.inputs), part(J.params)], axis=2)[:, :, self.by]
-        along = np.concatenate([np.asarray(J.t).reshape(n, self.n_y, 1)[:, self.places], part(J.x), others], axis=2)
-        result = slopes[:, :, slopes.shape[2] - len(self.places):] @ along
-        result[:, :, 1:] += slopes[:, :, :slopes.shape[2] - len(self.places)]
+        along = np.concatenate([np.asarray(J.t).reshape(n, self.n_y, 1)[:, self.indices], part(J.x), others], axis=2)
+        result = slopes[:, :, slopes.shape[2] - len(self.indices):] @ along
+        result[:, :, 1:] += slopes[:, :, :slopes.shape[2] - len(self.indices)]
         return np.asarray(result)
 
 

@@ -104,10 +104,10 @@ def shared_forces(A: np.ndarray, right: np.ndarray, H: np.ndarray, fixed: np.nda
         y, margin, rows = _largest_margin(_Null(lam_0 / force, inside), cones, sizes_of)
         sizes_of = np.maximum([_bound(lam_0 / force + inside @ y, cone) for cone in cones], SMALLEST)
     lam = lam_0 + force * (inside @ y)
-    places = np.argmax(np.abs(H) == 1, axis=0)  # of the unknowns among the rows
-    rows[places] = rows[places] / np.maximum(sizes, 1e-300)
+    indices = np.argmax(np.abs(H) == 1, axis=0)  # of the unknowns among the rows
+    rows[indices] = rows[indices] / np.maximum(sizes, 1e-300)
     softness = _by_parts(rows, H @ null)
-    E = sizes * softness[places]
+    E = sizes * softness[indices]
     along = np.linalg.lstsq(left.T @ (E[:, None] * null), -left.T @ (E * x_0), rcond=None)[0]
     given = H @ (x_0 + null @ along) + fixed
     reached = _margin(given / force, cones)

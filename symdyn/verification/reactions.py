@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.probes.vanishing_pivots import places
+from symdyn.formulation.probes.vanishing_pivots import nonzero_indices
 from symdyn.formulation.trees.reactions import own_rows
 from symdyn.model.closures import Gear
 from symdyn.model.elements import AddedMass
@@ -89,7 +89,7 @@ def _moving_together(owner: Any) -> dict[str, int | None]:
     forced = bool(owner.model.constraints) or any(isinstance(loop, Gear) for loop in owner.model.loops)
     groups: list[tuple[set[str], set[int], bool]] = []
     for link in tree.links:
-        speeds: set[int] = set().union(*[places(row) for row in tree.D[link.speeds]])
+        speeds: set[int] = set().union(*[nonzero_indices(row) for row in tree.D[link.speeds]])
         unknown = isinstance(link.joint, Modal) or any(not is_zero(e) for e in tree.w_t[link.speeds])
         unknown |= forced and not speeds <= set(owned)
         names = {link.joint.name}
@@ -123,10 +123,10 @@ def _joints(s: Sample, owner: Any, bodies: Mapping[str, np.ndarray]) -> list[tup
 
 def _all_joints(owner: Any) -> list[tuple[Any, int, int]]:
     model = owner.model
-    places = {body.name: k for k, body in enumerate(model.bodies)}
+    indices = {body.name: k for k, body in enumerate(model.bodies)}
 
     def place(body: Any) -> int:
-        return places.get(getattr(body, "name", body), -1)
+        return indices.get(getattr(body, "name", body), -1)
 
     tree = list(zip(model.joints, model.parents, model.children, strict=True))
     loops = [c.joint for c in owner.gathered.closures] if hasattr(owner, "gathered") else []

@@ -21,7 +21,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.contradictions import contradictions
 from symdyn.formulation.probes.dependent_rows import search
-from symdyn.formulation.sensitivities import Sensitive, places_of_resets
+from symdyn.formulation.sensitivities import Sensitive, indices_of_resets
 from symdyn.formulation.trees.equations import tree_of, tree_result
 from symdyn.formulation.trees.quantities import TreeQuantities
 from symdyn.formulation.trees.reactions import reactions
@@ -65,9 +65,9 @@ class ConstrainedTree(Constrained, TreeQuantities):
         above = {child: (joint, parent) for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True)}
 
         def path(body: Any) -> set[str]:
-            place, names = number.get(getattr(body, "name", body), -1), set()
-            while place in above:
-                joint, place = above[place]
+            index, names = number.get(getattr(body, "name", body), -1), set()
+            while index in above:
+                joint, index = above[index]
                 names.add(joint.name)
             return names
 
@@ -86,17 +86,17 @@ class ConstrainedTree(Constrained, TreeQuantities):
 
     def quantities(self) -> dict[str, Any]:
         own = {"reactions_by_lam": self.reactions_by_lam}
-        if self.rows and self._places_of_resets():
+        if self.rows and self._indices_of_resets():
             own["reset_directions"] = self.reset_directions
             own["carried_variation"] = self.carried_variation
         return {**super().quantities(), **own}
 
-    def _places_of_resets(self) -> list[int]:
-        return places_of_resets(self, self.model.events)
+    def _indices_of_resets(self) -> list[int]:
+        return indices_of_resets(self, self.model.events)
 
     def carried_variation(self) -> np.ndarray:
         """See Sensitive."""
-        return Sensitive(self).carried_variation(self._places_of_resets())
+        return Sensitive(self).carried_variation(self._indices_of_resets())
 
     def reset_directions(self) -> np.ndarray:
         """Change of [q; u], as far as the constraints let it, by a force along each coordinate and an impulse along each speed
@@ -107,9 +107,9 @@ class ConstrainedTree(Constrained, TreeQuantities):
         """
         recorder, saddle = self.algebra.recorder, self.recall("saddle")
         n_q, n_u, leaves = len(self.coordinates), len(self.speeds), [self.algebra.leaves[u] for u in self.speeds]
-        result = zeros(len(self._places_of_resets()), n_q + n_u)
+        result = zeros(len(self._indices_of_resets()), n_q + n_u)
         with self.algebra.section("directions of resets"):
-            for row, k in zip(result, self._places_of_resets(), strict=True):
+            for row, k in zip(result, self._indices_of_resets(), strict=True):
                 along = zeros(n_u)
                 if k < n_q:
                     along[:] = jacobian(recorder, [self.rates[k]], leaves, "forward")[0]
@@ -135,7 +135,7 @@ class ConstrainedTree(Constrained, TreeQuantities):
 
     def reactions_of(self, lam: np.ndarray, whole: bool = False) -> dict[str, np.ndarray]:
         """Joint name -> reaction with these multipliers, or whole: cut load."""
-        closed = {index for c in self.gathered.closures for index in c.places}
+        closed = {index for c in self.gathered.closures for index in c.indices}
         other = [k for k in range(len(self.rows)) if k not in closed]
         along = -self.C_r()[other].T @ lam[other] if other else None
         return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along,

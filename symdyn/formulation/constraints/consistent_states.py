@@ -98,6 +98,6 @@ class ConstraintStates:
         return self.moved(result, y / np.maximum(largest, 1.0))  # at most about a radian at once
 
     def _normalise(self, q: np.ndarray) -> None:
-        for places in self.units:
-            size = np.linalg.norm(q[:, places], axis=1, keepdims=True)
-            q[:, places] /= np.where(size > 0, size, 1.0)
+        for indices in self.units:
+            size = np.linalg.norm(q[:, indices], axis=1, keepdims=True)
+            q[:, indices] /= np.where(size > 0, size, 1.0)

@@ -38,7 +38,7 @@ class Constrained(Motion):
                   with others, m; angular: for each speed whether it turns (symdyn.turning)
     intrinsic        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
                   singular mass matrices and dependent constraints, too
-    independent   places of rows that imply the others; None: all rows
+    independent   indices of rows that imply the others; None: all rows
     pivots        (row, column) of C_r in the order in which dependent speeds are eliminated; None: by the Schur complement
     massless_pivots   first speed of a motion without kinetic energy at some positions -> the other speeds of this motion
     unheld        what it means if the numeric algorithm fails

@@ -182,8 +182,8 @@ def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[i
             return None
         fill = (in_rows[rows[admitted]] - 1) * (in_columns[columns[admitted]] - 1)
         least = admitted[fill == fill.min()]
-        place = least[np.argmax(size[least])]
-        i, j = int(rows[place]), int(columns[place])
+        index = least[np.argmax(size[least])]
+        i, j = int(rows[index]), int(columns[index])
         pivots.append((i, j))
         waiting[i] = False
         row, below = np.flatnonzero(left[i]), np.flatnonzero(waiting & left[:, j])

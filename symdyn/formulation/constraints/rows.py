@@ -57,7 +57,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Closure:
-    """A joint that closes a loop: its ends seen from the base link, its rows, and the places of these among all rows."""
+    """A joint that closes a loop: its ends seen from the base link, its rows, and the indices of these among all rows."""
 
     joint: Joint
     base: int
@@ -65,7 +65,7 @@ class Closure:
     parent: End
     child: End
     rows: tuple[ClosureRow, ...]
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
 
 
 class Gathered:
@@ -155,7 +155,7 @@ class Gathered:
         base = common_link(self.tree, *(pose.link for pose in poses))
         seen = self._seen.setdefault(base, Relative(self.tree, base))
         P, Q = self._ends(seen, joint, poses)
-        kept, places = [], []
+        kept, indices = [], []
         for row in closure_rows(a, joint, P, Q, self.model.planar):
             along = row.along(P, Q)
             jacobian = self.tree.by_speeds(along[None])[0]
@@ -163,8 +163,8 @@ class Gathered:
             full = Row(row.label, row.value, jacobian, inner(along, self.tree.w), row.remaining(P, Q), unit)
             if self._add(full, closes=True):
                 kept.append(row)
-                places.append(len(self.rows) - 1)
-        self.closures.append(Closure(joint, base, seen, P, Q, tuple(kept), tuple(places)))
+                indices.append(len(self.rows) - 1)
+        self.closures.append(Closure(joint, base, seen, P, Q, tuple(kept), tuple(indices)))
 
     def _ends(self, seen: Relative, joint: Joint, poses: Sequence[Pose]) -> tuple[End, End]:
         a = self.algebra
@@ -180,7 +180,7 @@ class Gathered:
             if closure.base == GROUND:
                 with self.algebra.section(f"constraints of {closure.joint.kind} {closure.joint.name}"):
                     P, Q = self._ends(seen, closure.joint, (closure.parent.pose, closure.child.pose))
-                    for row, index in zip(closure.rows, closure.places, strict=True):
+                    for row, index in zip(closure.rows, closure.indices, strict=True):
                         result[index] = row.remaining(P, Q)
         return result
 

@@ -131,7 +131,7 @@ def least_multipliers(recorder: Recorder, C: np.ndarray, rows: np.ndarray, colum
 class SubsetSolver:
     """With some of the rows only, which imply the others; the multipliers of these are 0.
 
-    kept   places of the rows among all n
+    kept   indices of the rows among all n
     """
 
     solver: SaddleSolver
@@ -157,8 +157,8 @@ def narrow_order(M: np.ndarray, C: np.ndarray) -> list[int]:
 
     near = np.array([[not is_zero(e) for e in row] for row in M])
     for row in C:
-        places = [k for k, e in enumerate(row) if not is_zero(e)]
-        near[np.ix_(places, places)] = True
+        indices = [k for k, e in enumerate(row) if not is_zero(e)]
+        near[np.ix_(indices, indices)] = True
     order = reverse_cuthill_mckee(csr_matrix(near), symmetric_mode=True)
     return [int(k) for k in order]
 

@@ -32,7 +32,7 @@ POWERS = 12
 
 @dataclass(frozen=True)
 class Sampled:
-    """(m, n) matrices A at s states: entries at places rows, columns (e,), ascending row by row; values (s, e)."""
+    """(m, n) matrices A at s states: entries at the indices rows, columns (e,), ascending row by row; values (s, e)."""
 
     m: int
     n: int
@@ -76,19 +76,19 @@ class Sampled:
 
     def of_rows(self, kept: Sequence[int]) -> Sampled:
         """These rows in this order."""
-        place = np.full(self.m, -1)
-        place[list(kept)] = range(len(kept))
-        there = np.flatnonzero(place[self.rows] >= 0)
-        order = there[np.argsort(place[self.rows[there]], kind="stable")]
-        return Sampled(len(kept), self.n, place[self.rows[order]], self.columns[order], self.values[:, order])
+        index = np.full(self.m, -1)
+        index[list(kept)] = range(len(kept))
+        there = np.flatnonzero(index[self.rows] >= 0)
+        order = there[np.argsort(index[self.rows[there]], kind="stable")]
+        return Sampled(len(kept), self.n, index[self.rows[order]], self.columns[order], self.values[:, order])
 
     def of_columns(self, kept: Sequence[int]) -> Sampled:
         """These columns in this order."""
-        place = np.full(self.n, -1)
-        place[list(kept)] = range(len(kept))
-        there = np.flatnonzero(place[self.columns] >= 0)
-        order = there[np.lexsort((place[self.columns[there]], self.rows[there]))]
-        return Sampled(self.m, len(kept), self.rows[order], place[self.columns[order]], self.values[:, order])
+        index = np.full(self.n, -1)
+        index[list(kept)] = range(len(kept))
+        there = np.flatnonzero(index[self.columns] >= 0)
+        order = there[np.lexsort((index[self.columns[there]], self.rows[there]))]
+        return Sampled(self.m, len(kept), self.rows[order], index[self.columns[order]], self.values[:, order])
 
     def without_rows(self, left_out: np.ndarray) -> Sampled:
         """The rows where this (m,) holds are zero."""
@@ -177,14 +177,14 @@ class Sampled:
     def triangular(self) -> Triangular:
         """R of A^T = Q R."""
         order = elimination(self)
-        place = np.empty(self.m, dtype=int)
-        place[order] = range(self.m)
+        index = np.empty(self.m, dtype=int)
+        index[order] = range(self.m)
         largest = _largest(self)
         fronts: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in range(self.m)]
-        by_column = np.lexsort((place[self.rows], self.columns))
+        by_column = np.lexsort((index[self.rows], self.columns))
         for entries in np.split(by_column, np.searchsorted(self.columns[by_column], np.arange(1, self.n))):
             if len(entries):
-                at = place[self.rows[entries]]
+                at = index[self.rows[entries]]
                 fronts[at[0]].append((at, self.values[:, None, entries]))
         kept = np.zeros((len(self), self.m), dtype=bool)
         R: list[tuple[np.ndarray, np.ndarray]] = []

@@ -81,11 +81,11 @@ class Loads:
             self._add(result, load, conservative, other)
         for body in self.tree.flexible:
             with self.algebra.section(f"link {self.tree.links[body.link].name}: elastic forces and damping"):
-                places = slice(body.speeds.start, body.speeds.stop)
+                indices = slice(body.speeds.start, body.speeds.stop)
                 if conservative:
-                    result.joint[places] -= body.stiffness @ body.eta
+                    result.joint[indices] -= body.stiffness @ body.eta
                 if other:
-                    result.joint[places] -= body.damping @ body.eta_dot
+                    result.joint[indices] -= body.damping @ body.eta_dot
         return result
 
     def of_one(self, load: Any) -> Applied:
@@ -192,10 +192,10 @@ class Loads:
     def _action(self, load: Element) -> Action:
         """The action of an element, recorded once."""
         if id(load) not in self._actions:
-            place = self._place(load.body)
-            assert place is not None  # checked with the model: nothing comes of a load on the ground
+            index = self._index(load.body)
+            assert index is not None  # checked with the model: nothing comes of a load on the ground
             with self.algebra.section(f"load {load.label}"):
-                self._actions[id(load)] = load.act(BodySite(self.tree, self.kinematics, place))
+                self._actions[id(load)] = load.act(BodySite(self.tree, self.kinematics, index))
         return self._actions[id(load)]
 
     def _element(self, result: Applied, load: Element, conservative: bool, other: bool) -> None:
@@ -289,10 +289,10 @@ class Loads:
 
     def pose(self, body: Any) -> Pose:
         """Where a body's frame sits; the ground's frame for the ground."""
-        place = self._place(body)
-        return self.tree.ground if place is None else self.tree.poses[place]
+        index = self._index(body)
+        return self.tree.ground if index is None else self.tree.poses[index]
 
-    def _place(self, body: Any) -> int | None:
+    def _index(self, body: Any) -> int | None:
         """Number of a body; None for the ground."""
         names = {b.name: k for k, b in enumerate(self.model.bodies)}
         return names.get(body.name if isinstance(body, Body) else body)

@@ -212,6 +212,6 @@ def _loose(draw: _Draw) -> set[int] | None:
         if not null.any():
             return None
         entries = np.abs(free @ vectors[:, null]).max(axis=1)
-        places = {int(j) for j in np.flatnonzero(entries > 1e-6)}
-        common = places if common is None else common | places
+        indices = {int(j) for j in np.flatnonzero(entries > 1e-6)}
+        common = indices if common is None else common | indices
     return common

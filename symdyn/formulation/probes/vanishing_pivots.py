@@ -92,7 +92,7 @@ def behind(tree: Tree, k: int, twist: np.ndarray, blocks: Callable[[int], tuple[
     return total
 
 
-def places(row: np.ndarray) -> frozenset[int]:
+def nonzero_indices(row: np.ndarray) -> frozenset[int]:
     """Where a row is not zero by structure."""
     return frozenset(np.flatnonzero(row != 0).tolist())  # a node is not equal to a number
 

@@ -7,7 +7,7 @@ from symdyn.formulation.trees.tree import Tree
 
 
 def own_speeds(tree: Tree) -> list[list[int]]:
-    """For each link the places of the generalized speeds that move its joint and no other; empty for a given motion.
+    """For each link the indices of the generalized speeds that move its joint and no other; empty for a given motion.
 
     Raises SymdynError for a speed that moves several joints (gears, absolute angles) or none: such joints cannot be released
     one after the other.

@@ -30,7 +30,7 @@ class FlexibleLink:
 
     link      number of the link at its free end, whose joint has the elastic coordinates; root: of the link at its clamped
               end, or GROUND
-    R, p      pose of the clamped end in that link; speeds: places of eta_dot among the joint speeds
+    R, p      pose of the clamped end in that link; speeds: indices of eta_dot among the joint speeds
     eta, eta_dot   (n,)
     stiffness, damping   (n, n)
     """

@@ -93,7 +93,7 @@ def _beyond_rigid(tree: Tree, kinematics: Kinematics, motions: Sequence[LinkMoti
 def _closing(closure: Closure, lam: np.ndarray, act: Any, kinematics: Kinematics) -> np.ndarray:
     """The reaction of a closing joint; acts on both bodies like a load."""
     force, moment, back = zeros(3), zeros(3), zeros(3)
-    for row, index in zip(closure.rows, closure.places, strict=True):
+    for row, index in zip(closure.rows, closure.indices, strict=True):
         force, moment, back = force - lam[index] * row.f, moment - lam[index] * row.n_c, back - lam[index] * row.n_p
     seen = closure.seen
     for end, f, n in ((closure.child, force, moment), (closure.parent, -force, back)):
@@ -163,9 +163,9 @@ def _on_joints(tree: Tree, along_speeds: np.ndarray | None) -> np.ndarray:
 
 
 def own_rows(tree: Tree) -> dict[int, int]:
-    """Place of a generalized speed among all -> that of the joint speed that it is; speeds that no joint has are left out."""
-    places = {u: k for k, u in enumerate(tree.model.speeds)}
+    """Index of a generalized speed among all -> that of the joint speed that it is; speeds that no joint has are left out."""
+    indices = {u: k for k, u in enumerate(tree.model.speeds)}
     result: dict[int, int] = {}
     for link in tree.links:
-        result.update({places[u]: row for u, row in zip(joint_speeds(link.joint), link.speeds, strict=True) if u in places})
+        result.update({indices[u]: row for u, row in zip(joint_speeds(link.joint), link.speeds, strict=True) if u in indices})
     return result

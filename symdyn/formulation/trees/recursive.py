@@ -173,11 +173,11 @@ class _InSpeeds:
 
 
 def _own_speeds(tree: Tree) -> tuple[int, ...] | None:
-    """For each generalized speed the place of the joint speed that it is, or None if joints share speeds or scale them."""
-    places = []
+    """For each generalized speed the index of the joint speed that it is, or None if joints share speeds or scale them."""
+    indices = []
     for column, rows in enumerate(tree.driven):
         factors = [tree.D[row, column] for row in rows]
         if len(factors) != 1 or not isinstance(factors[0], int) or factors[0] != 1:
             return None
-        places.append(rows[0])
-    return tuple(places) if len(set(places)) == len(places) else None
+        indices.append(rows[0])
+    return tuple(indices) if len(set(indices)) == len(indices) else None

@@ -24,7 +24,7 @@ class End:
     """A point of a body and a frame on the body, seen from the base link, in its axes.
 
     p (3,), A (3, 3) frame to base components; Jv, Jw (3, n_w): velocity of the point and omega per unit joint speed;
-    along: the places of joint speeds that move the body; others have columns of zeros
+    along: the indices of joint speeds that move the body; others have columns of zeros
     v, omega (3,) with the speeds of the state; a, alpha (3,) accelerations with u_dot = 0 (of the ground: less gravity's)
     """
 

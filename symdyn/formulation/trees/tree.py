@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.identification.joint_regrouping import coordinate_axis, unmoved
-from symdyn.formulation.probes.vanishing_pivots import places, vanishing_pivots
+from symdyn.formulation.probes.vanishing_pivots import nonzero_indices, vanishing_pivots
 from symdyn.formulation.trees.axes import along_coordinate_axis
 from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.water import of_load
@@ -56,7 +56,7 @@ class Link:
     parent      index of the parent link, or GROUND
     R, r        (3, 3) link to parent components; (3,) origin in the parent's frame, parent axes
     S, c        the joint's motion subspace (6, k) and velocity product (6,), link axes (see JointMotion)
-    speeds      places of the joint's speeds among all joint speeds of the tree
+    speeds      indices of the joint's speeds among all joint speeds of the tree
     inertia     of all bodies merged into the link, about its origin, link axes
     effective   the same with what its joint does not move counted to its parent (see regrouping); same equations of motion
     """
@@ -121,12 +121,12 @@ class Tree:
 
     @cached_property
     def drivers(self) -> tuple[frozenset[int], ...]:
-        """For each joint speed the places of the generalized speeds that it is made of: columns of D that are not zero."""
-        return tuple(places(row) for row in self.D)
+        """For each joint speed the indices of the generalized speeds that it is made of: columns of D that are not zero."""
+        return tuple(nonzero_indices(row) for row in self.D)
 
     @cached_property
     def driven(self) -> tuple[tuple[int, ...], ...]:
-        """For each generalized speed the places of the joint speeds that it is part of: rows of D that are not zero."""
+        """For each generalized speed the indices of the joint speeds that it is part of: rows of D that are not zero."""
         result: list[list[int]] = [[] for _ in self.model.speeds]
         for k, speeds in enumerate(self.drivers):
             for j in speeds:
@@ -224,7 +224,7 @@ class _Builder:
     def tree(self) -> Tree:
         model, a = self.model, self.algebra
         self.rates = add_rates(model, a)
-        self.places = {u: k for k, u in enumerate(model.speeds)}
+        self.indices = {u: k for k, u in enumerate(model.speeds)}
         ground = Pose(GROUND, identity(), zeros(3))
         if model.ground_motion is not None:
             ground = self._part(model.ground_motion, ground)
@@ -277,8 +277,8 @@ class _Builder:
         w: list[Any] = []
         for k, symbol in enumerate(symbols):
             row: list[Any] = [0] * n_u
-            if symbol is not None and symbol in self.places:
-                row[self.places[symbol]] = 1
+            if symbol is not None and symbol in self.indices:
+                row[self.indices[symbol]] = 1
                 w.append(a.leaves[symbol])
                 self.w_t.append(0)
                 self.b.append(0)
@@ -402,11 +402,12 @@ class _Builder:
                 continue
             number = next(k for k, link in enumerate(links) if link.joint is joint)
             pose, speeds = poses[parent], links[number].speeds
-            places = slice(speeds.start, speeds.stop)
+            indices = slice(speeds.start, speeds.stop)
             eta = a.constants(joint.coordinates)
             K, D = (a.expression(factor) * exactly(matrix) for factor, matrix in
                     ((joint.stiffness, joint.beam.K), (joint.damping, joint.beam.D)))
-            result.append(FlexibleLink(number, pose.link, pose.R, pose.p, speeds, eta, vector(*self.w[places]), K, D, joint.beam))
+            rates = vector(*self.w[indices])
+            result.append(FlexibleLink(number, pose.link, pose.R, pose.p, speeds, eta, rates, K, D, joint.beam))
         return tuple(result)
 
     def _worked(self, pose: Pose) -> Pose:

@@ -29,7 +29,7 @@ class BatchSensitivity(Mapping[Any, np.ndarray]):
 
     def __getitem__(self, name: Any) -> np.ndarray:
         """By a parameter, an input or an initial value, by name or symbol. Raises ArgumentError for another."""
-        return self.matrix[..., _place(name_of(name), self.names, f"{self._metadata.name}: the motions have no sensitivity by")]
+        return self.matrix[..., _index(name_of(name), self.names, f"{self._metadata.name}: the motions have no sensitivity by")]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -42,14 +42,14 @@ class BatchSensitivity(Mapping[Any, np.ndarray]):
 
     def of(self, name: Key) -> np.ndarray:
         """Derivatives of one coordinate, speed or extra state by all, (n, n_t, n_names). Raises ArgumentError for another."""
-        return self.matrix[..., _place(name_of(name), self._metadata.x, f"{self._metadata.name}: there is no state"), :]
+        return self.matrix[..., _index(name_of(name), self._metadata.x, f"{self._metadata.name}: there is no state"), :]
 
     def __repr__(self) -> str:
         n, n_t, n_x, _ = self.matrix.shape
         return f"<Sensitivity of {n} motions, {n_x} states at {n_t} times, by {', '.join(self.names)}>"
 
 
-def _place(name: str, known: Sequence[str], what: str) -> int:
+def _index(name: str, known: Sequence[str], what: str) -> int:
     if name not in known:
         raise ArgumentError(f"{what} {shown(name)}; there are {', '.join(known)}")
     return known.index(name)
@@ -159,7 +159,7 @@ class BatchSolution:
 
     def __getitem__(self, name: Key) -> np.ndarray:
         """One coordinate, speed or extra state by name or symbol, (n, n_t)."""
-        return self.x[..., _place(name_of(name), self.metadata.x, f"{self.metadata.name}: there is no state")]
+        return self.x[..., _index(name_of(name), self.metadata.x, f"{self.metadata.name}: there is no state")]
 
     def __len__(self) -> int:
         return len(self.success)

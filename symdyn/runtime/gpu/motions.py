@@ -49,7 +49,7 @@ class Work:
     pieces, stops   inputs over time, and instants that steps end at
     look, event_spacing, taken_after   events to look for, (n_e,) of integers, empty: none; samples of them; steps between takes
     x, states, reports, doubts   results of n motions
-    there      where numbers of motions lie on the device already, by their place among all that are given: address and stride
+    there      where numbers of motions lie on the device already, by their index among all that are given: address and stride
     Numbers of the device are of the type of x, but for times. Where x is an array there, it stays there.
     """
 
@@ -160,7 +160,7 @@ def integrate(device: Device, kernels: MotionKernels, work: Work, owner: str) ->
                             f"{f', {in_bytes(stacks)} of these for stacks of threads' * bool(stacks)}; ask for fewer output times"
                             f"{', or free some' * bool(stacks)}")
     size = max(1, min(n, most, max(ROUNDS * threads, -(-n // (4 * SLOTS)))))
-    numbers = len(work.there) + sum(len(places) for places, _ in work.given)
+    numbers = len(work.there) + sum(len(indices) for indices, _ in work.given)
     taken: list[int] = []
 
     def allocated(nbytes: int) -> int:

@@ -42,7 +42,7 @@ def motion_inputs(metadata: ModuleMetadata) -> tuple[str, ...]:
 class Followed:
     """A motion that an input follows.
 
-    name, place   of its value among the inputs; rate and acceleration come after it
+    name, index   of its value among the inputs; rate and acceleration come after it
     pieces        as a piecewise polynomial of the three, where it is one of order three at most; else None
     function      of t, which returns the three
     breaks        times at which steps have to end
@@ -50,16 +50,16 @@ class Followed:
     """
 
     name: str
-    place: int
+    index: int
     pieces: Pieces | None = None
     function: Callable[[float], Any] | None = None
     breaks: tuple[float, ...] = ()
     smooth: bool = False
 
     @property
-    def places(self) -> list[int]:
+    def indices(self) -> list[int]:
         """Indices of value, rate and acceleration."""
-        return [self.place, self.place + 1, self.place + 2]
+        return [self.index, self.index + 1, self.index + 2]
 
     def at(self, t: float, x: np.ndarray = NO_STATE) -> np.ndarray:
         """Value, rate and acceleration, (3,); x: the state there, for messages.
@@ -97,7 +97,7 @@ class Motions:
             return np.array([self.at(one) for one in np.asarray(t, dtype=float)]).reshape(np.shape(t)[0], len(self.constant))
         values = self.constant.copy()
         for motion in self.followed:
-            values[motion.places] = motion.at(float(t))
+            values[motion.indices] = motion.at(float(t))
         return values
 
 

@@ -63,7 +63,7 @@ def _undeclared(given: Any) -> Any:
 class Mixed:
     """The function of inputs that are given one by one: constant (n_in,), or by tables, but for what has a function of its own.
 
-    functions   place of the input, its name, its function of (t, x)
+    functions   index of the input, its name, its function of (t, x)
     followed    motions by functions of t
     """
 
@@ -82,7 +82,7 @@ class Mixed:
                 raise ArgumentError(f"the function of input {name} returned {shown(value)} at t = {t:.6g}; needed is a "
                                     f"number: {error}") from None
         for motion in self.followed:
-            values[motion.places] = motion.at(t, x)
+            values[motion.indices] = motion.at(t, x)
         return values
 
 
@@ -96,7 +96,7 @@ class Inputs:
     samplers   controllers that set some of the constants at instants; until then these have their initial values
     record     the values of these as the controllers held them in a run, in place of samplers
     motions    those that inputs follow; None: there are none, or they stand still
-    gradients  of functions that have one: places of the inputs, derivatives of their values by the state, what messages call it
+    gradients  of functions that have one: indices of the inputs, derivatives of their values by the state, what messages call it
     """
 
     constant: np.ndarray
@@ -113,28 +113,28 @@ class Inputs:
         """Derivatives of the inputs along columns (k, n_x) of sensitivities, (n_in, k), by the gradients of functions. Raises
         InputRaised from what these raise, ArgumentError for what does not fit."""
         result = np.zeros((len(self.constant), len(columns)))
-        for places, gradient, what in self.gradients:
+        for indices, gradient, what in self.gradients:
             given = called(gradient, t, x, what, (t, x.copy()))
             try:
-                rows = np.asarray(given, dtype=float).reshape(len(places), len(x))
+                rows = np.asarray(given, dtype=float).reshape(len(indices), len(x))
             except (TypeError, ValueError):
                 raise ArgumentError(f"{what} returned {shown(given)} at t = {t:.6g}; needed are {len(x)} numbers for each of its "
                                     "inputs") from None
             if np.isfinite(x).all() and not np.isfinite(rows).all():
                 raise InputRaised(f"{what} is {rows[~np.isfinite(rows)][0]:g} at t = {t:.6g}", t, x)
-            result[list(places)] = rows @ columns.T
+            result[list(indices)] = rows @ columns.T
         return result
 
     def demand_true_slopes(self, t: float, x: np.ndarray) -> None:
         """Raises ArgumentError where the gradient of a function contradicts it, or is not finite, at a time and state (n_x,)."""
-        for places, _, what in self.gradients:
+        for indices, _, what in self.gradients:
             try:
-                rows = self.slopes(t, x, np.eye(len(x)))[list(places)]
+                rows = self.slopes(t, x, np.eye(len(x)))[list(indices)]
             except InputRaised as error:
                 if error.__cause__ is not None:  # what a function raises ends the run
                     return
                 raise ArgumentError(str(error)) from None
-            slopes = contradiction(lambda state, places=places: self.at(t, state)[list(places)], x, rows)  # type: ignore[misc]
+            slopes = contradiction(lambda state, indices=indices: self.at(t, state)[list(indices)], x, rows)  # type: ignore[misc]
             if slopes is not None:
                 raise ArgumentError(message(what.removeprefix("the gradient of "), slopes, t, "the state"))
 
@@ -160,14 +160,14 @@ class Inputs:
             return []
         if not isinstance(self.function, Mixed):
             return list(names)
-        moving = [names[k] for m in self.function.followed if not m.breaks for k in m.places]
+        moving = [names[k] for m in self.function.followed if not m.breaks for k in m.indices]
         return [name for _, name, _ in self.function.functions] + moving
 
     def varying(self, names: Sequence[str]) -> list[str]:
         """Those of the inputs, in order, that are not constant: given by functions, tables or controllers."""
-        given = set(self.by_function(names)) | {names[k] for k in (self.places if self.are_held else ())}
+        given = set(self.by_function(names)) | {names[k] for k in (self.indices if self.are_held else ())}
         if isinstance(self.function, Mixed):
-            given |= {names[k] for m in self.function.followed for k in m.places}
+            given |= {names[k] for m in self.function.followed for k in m.indices}
         pieces = self.function.pieces if isinstance(self.function, Mixed) else self.pieces
         if pieces is not None:
             rows = pieces.coefficients
@@ -180,22 +180,22 @@ class Inputs:
         return bool(self.samplers) or self.record is not None
 
     @property
-    def places(self) -> list[int]:
+    def indices(self) -> list[int]:
         """Indices of the inputs that controllers set."""
-        return sorted({index for sampler in self.samplers for index in sampler.places} if self.record is None
-                      else self.record.places)
+        return sorted({index for sampler in self.samplers for index in sampler.indices} if self.record is None
+                      else self.record.indices)
 
     def held(self, values: np.ndarray | None = None) -> Inputs:
         """The same with these constants (n_in,) (default: the initial values) in place of what controllers set."""
         constant = self.constant.copy()
         if values is not None:
-            constant[self.places] = values[self.places]
+            constant[self.indices] = values[self.indices]
         function, pieces = self.function, self.pieces
         if isinstance(function, Mixed):
-            within = None if function.pieces is None else function.pieces.with_constants(self.places, constant)
+            within = None if function.pieces is None else function.pieces.with_constants(self.indices, constant)
             function = replace(function, constant=constant, pieces=within)
         if pieces is not None:
-            pieces = pieces.with_constants(self.places, constant)
+            pieces = pieces.with_constants(self.indices, constant)
         return replace(self, constant=constant, pieces=pieces, function=function, samplers=(), record=None)
 
     def recorded(self, record: Record | None) -> Inputs:
@@ -297,15 +297,15 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         demand_rest(constant, names, motions, owner)
         return Inputs(constant)
     samplers, given = _samplers(given, names, owner)
-    sampled = {names[index]: start[index] for sampler in samplers for index in sampler.places}
+    sampled = {names[index]: start[index] for sampler in samplers for index in sampler.indices}
     parts = {name_of(key): value for key, value in given.items()}
     for n, value in parts.items():
         pieces = None if n in motions else spline_pieces(value, f"{owner}: inputs: {n}", span)
         parts[n] = value if pieces is None else Piecewise(pieces)
-    places = {n: k for k, n in enumerate(names)}
+    indices = {n: k for k, n in enumerate(names)}
     varying = {n: v for n, v in parts.items() if callable(v) or is_table(v) or isinstance(v, tuple)}
     moving = {n: varying.pop(n) for n in motions if n in varying}
-    followed = [take_motion(_undeclared(v), n, places[n], owner, span, isinstance(v, Smooth)) for n, v in moving.items()]
+    followed = [take_motion(_undeclared(v), n, indices[n], owner, span, isinstance(v, Smooth)) for n, v in moving.items()]
     _demand_known_rates(parts, sampled, motions, owner)
     parts = {n: v for n, v in parts.items() if n not in moving}
     constant = take({n: v for n, v in parts.items() if n not in varying} | dict.fromkeys(varying, 0.0) | sampled, names, "inputs",
@@ -314,24 +314,24 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     if not varying and not followed:
         return Inputs(constant, samplers=samplers)
     functions = {n: partial(_asked, _undeclared(v), f"the function of input {n}") for n, v in varying.items() if callable(v)}
-    tables = [([places[n]], _table(v, for_pairs, [n], owner, span).pieces) for n, v in varying.items() if n not in functions]
-    tables += [(m.places, m.pieces) for m in followed if m.pieces is not None]
+    tables = [([indices[n]], _table(v, for_pairs, [n], owner, span).pieces) for n, v in varying.items() if n not in functions]
+    tables += [(m.indices, m.pieces) for m in followed if m.pieces is not None]
     pieces = joined(tables, constant) if tables else None
     along = Motions(constant, tuple(followed)) if followed else None
     kinks = np.unique(np.concatenate([np.zeros(0) if pieces is None else pieces.breaks, *[np.array(m.breaks) for m in followed]]))
     by_function = tuple(m for m in followed if m.pieces is None)
     if not functions and not by_function:
         return Inputs(constant, pieces=pieces, kinks=kinks, samplers=samplers, motions=along)
-    mixed = Mixed(constant, pieces, tuple((places[n], n, f) for n, f in functions.items()), by_function)
+    mixed = Mixed(constant, pieces, tuple((indices[n], n, f) for n, f in functions.items()), by_function)
     smooth = all(isinstance(varying[n], Smooth) for n in functions) and all(m.smooth or m.breaks for m in by_function)
-    of = {f"the function of input {n}": (varying[n], [places[n]]) for n in functions}
+    of = {f"the function of input {n}": (varying[n], [indices[n]]) for n in functions}
     return Inputs(constant, function=mixed, kinks=kinks, smooth=smooth, samplers=samplers, motions=along,
                   gradients=_gradients(of))
 
 
 def _gradients(given: Mapping[str, tuple[Any, Sequence[int]]]) -> tuple[tuple[tuple[int, ...], Any, str], ...]:
-    """Those of functions that have one; given: how messages call a function -> the function and the places of its inputs."""
-    return tuple((tuple(places), value.gradient, f"the gradient of {what}") for what, (value, places) in given.items()
+    """Those of functions that have one; given: how messages call a function -> the function and the indices of its inputs."""
+    return tuple((tuple(indices), value.gradient, f"the gradient of {what}") for what, (value, indices) in given.items()
                  if isinstance(value, Smooth) and value.gradient is not None)
 
 

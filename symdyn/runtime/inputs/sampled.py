@@ -70,10 +70,10 @@ class SampleRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Sampler:
-    """A controller with the places of the inputs that it sets, and how messages call it."""
+    """A controller with the indices of the inputs that it sets, and how messages call it."""
 
     sampled: Sampled
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     what: str
 
     def values(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -83,9 +83,9 @@ class Sampler:
             values = np.asarray(given, dtype=float).reshape(-1)
         except (TypeError, ValueError):
             values = np.zeros(0)
-        if len(values) != len(self.places):
-            wanted = "a number" if len(self.places) == 1 else f"{len(self.places)} numbers"
-            needed = "needed is" if len(self.places) == 1 else "needed are"
+        if len(values) != len(self.indices):
+            wanted = "a number" if len(self.indices) == 1 else f"{len(self.indices)} numbers"
+            needed = "needed is" if len(self.indices) == 1 else "needed are"
             raise ArgumentError(f"{self.what} returned {given!r} at t = {t:.6g}; {needed} {wanted}")
         return values
 
@@ -94,7 +94,7 @@ class Sampler:
         assert self.sampled.gradient is not None
         given = called(self.sampled.gradient, t, x, f"the gradient of {self.what}", (t, x.copy()))
         try:
-            rows = np.asarray(given, dtype=float).reshape(len(self.places), len(x))
+            rows = np.asarray(given, dtype=float).reshape(len(self.indices), len(x))
         except (TypeError, ValueError):
             raise ArgumentError(f"the gradient of {self.what} returned {given!r} at t = {t:.6g}; needed are {len(x)} numbers for "
                                 "each of its inputs") from None
@@ -105,19 +105,19 @@ class Sampler:
 
 @dataclass(frozen=True)
 class Record:
-    """Inputs as they were held: from times (n,) on, values (n, n_in) at the places of inputs that controllers set; fresh
+    """Inputs as they were held: from times (n,) on, values (n, n_in) at the indices of inputs that controllers set; fresh
     (n, n_in): those that were set then; ahead: the instant at which the latest piece was to end, s; columns (n, n_in, k): their
     derivatives along sensitivities, k may be 0."""
 
     times: np.ndarray
     values: np.ndarray
     fresh: np.ndarray
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     ahead: float
     columns: np.ndarray
 
     def rows(self, t: Any) -> np.ndarray:
-        """The inputs at times, (..., n_in), right at the places alone; at an instant those that take effect there."""
+        """The inputs at times, (..., n_in), right at the indices alone; at an instant those that take effect there."""
         result: np.ndarray = self.values[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
         return result
 
@@ -128,9 +128,9 @@ class Record:
 
     def put(self, t: Any, values: np.ndarray) -> np.ndarray:
         """Inputs at times with what was held in place of the values (n_in,), or (n, n_in) or (1, n_in) for (n,) times."""
-        places, held = list(self.places), self.rows(t)
+        indices, held = list(self.indices), self.rows(t)
         result = np.array(np.broadcast_to(values, held.shape))
-        result[..., places] = held[..., places]
+        result[..., indices] = held[..., indices]
         return result
 
     def of(self, index: int) -> SampleRows:
@@ -188,14 +188,14 @@ class Sampling:
             for k, sampler in enumerate(self.samplers):
                 instant = self._instant(k)
                 if instant <= t + self.close:
-                    slopes = sampler.columns(t, x, columns) if len(columns) else np.zeros((len(sampler.places), 0))
-                    self.waiting.append((instant + sampler.sampled.delay, sampler.places, sampler.values(t, x), slopes))
+                    slopes = sampler.columns(t, x, columns) if len(columns) else np.zeros((len(sampler.indices), 0))
+                    self.waiting.append((instant + sampler.sampled.delay, sampler.indices, sampler.values(t, x), slopes))
                     self.counts[k] += 1
-            for when, places, values, slopes in self.waiting:
+            for when, indices, values, slopes in self.waiting:
                 if when <= t + self.close:
-                    self.held[list(places)] = values
-                    self.columns[list(places)] = slopes
-                    fresh[list(places)] = True
+                    self.held[list(indices)] = values
+                    self.columns[list(indices)] = slopes
+                    fresh[list(indices)] = True
             self.waiting = [w for w in self.waiting if w[0] > t + self.close]
         finally:  # also where a controller ends the run: its steps, which a replay repeats, end here
             self._times.append(t)
@@ -217,7 +217,7 @@ class Sampling:
         """Values held so far."""
         return Record(np.array(self._times), np.array(self._values).reshape(-1, len(self.held)),
                       np.array(self._fresh).reshape(-1, len(self.held)),
-                      tuple(sorted({index for sampler in self.samplers for index in sampler.places})),
+                      tuple(sorted({index for sampler in self.samplers for index in sampler.indices})),
                       self.after(self._times[-1] if self._times else self.begin),
                       np.array(self._columns).reshape(len(self._columns), *self.columns.shape))
 

@@ -35,11 +35,11 @@ class Pieces:
         d, c = np.asarray(inside - self.breaks[k])[..., None], self.coefficients[k]
         return np.asarray(c[..., 0] + d * (c[..., 1] + d * (c[..., 2] + d * c[..., 3])))
 
-    def with_constants(self, places: Sequence[int], values: np.ndarray) -> Pieces:
-        """The same but for inputs at these places, which have these values (n_in,) at all times."""
+    def with_constants(self, indices: Sequence[int], values: np.ndarray) -> Pieces:
+        """The same but for inputs at these indices, which have these values (n_in,) at all times."""
         coefficients = self.coefficients.copy()
-        coefficients[:, places] = 0.0
-        coefficients[:, places, 0] = values[places]
+        coefficients[:, indices] = 0.0
+        coefficients[:, indices, 0] = values[indices]
         return Pieces(self.breaks, coefficients)
 
 
@@ -132,14 +132,14 @@ def _first_wrong(times: np.ndarray, values: np.ndarray) -> str:
 def joined(parts: Sequence[tuple[Sequence[int], Pieces]], constant: np.ndarray) -> Pieces:
     """One piecewise polynomial of all inputs, with the breaks of all.
 
-    parts      places of inputs and the pieces of these
+    parts      indices of inputs and the pieces of these
     constant   (n_in,) of those that have none
     """
     breaks = np.unique(np.concatenate([pieces.breaks for _, pieces in parts]))
     coefficients = np.zeros((len(breaks) - 1, len(constant), ORDER))
     coefficients[:, :, 0] = constant
     middle = (breaks[1:] + breaks[:-1]) / 2
-    for places, pieces in parts:
+    for indices, pieces in parts:
         k = np.clip(np.searchsorted(pieces.breaks, middle, side="right") - 1, 0, len(pieces.coefficients) - 1)
         c0, c1, c2, c3 = np.moveaxis(pieces.coefficients[k], -1, 0)
         d = (breaks[:-1] - pieces.breaks[k])[:, None]
@@ -147,5 +147,5 @@ def joined(parts: Sequence[tuple[Sequence[int], Pieces]], constant: np.ndarray) 
         for outside, end in ((middle < pieces.breaks[0], pieces.breaks[0]), (middle > pieces.breaks[-1], pieces.breaks[-1])):
             moved[outside] = 0.0
             moved[outside, :, 0] = pieces.at(end)
-        coefficients[:, list(places)] = moved
+        coefficients[:, list(indices)] = moved
     return Pieces(breaks, coefficients)

@@ -151,7 +151,7 @@ def _converged(module: Module, t: float, change: float, values: np.ndarray) -> N
 
 @dataclass
 class Instant:
-    """Controllers are sampled, or what they hold changes: gradients of those that are sampled here, by place; places of inputs
+    """Controllers are sampled, or what they hold changes: gradients of those that are sampled here, by index; indices of inputs
     that take another value, with the number of the instant at which it was sampled."""
 
     number: int
@@ -169,7 +169,7 @@ class Chain:
         self.request = replace(request, look=None)
         self.cuts = moments(module, outcome, request)
         self.record = outcome.record
-        held = [] if self.record is None else [module.metadata.inputs[k] for k in self.record.places]
+        held = [] if self.record is None else [module.metadata.inputs[k] for k in self.record.indices]
         self.carried = tuple(dict.fromkeys([*carried, *held]))
         self.direction = 1.0 if request.span[1] >= request.span[0] else -1.0
         self.pieces: list[Way | Bridge | Jump | Instant] = []
@@ -336,8 +336,8 @@ class Chain:
             k = round((t - begin - of.offset) / of.period)
             if k >= 0 and abs(begin + of.offset + k * of.period - t) <= near:
                 slopes = sampler.columns(t, x, np.eye(len(x)))
-                sampled |= dict(zip(sampler.places, slopes, strict=True))
-            for index in sampler.places:
+                sampled |= dict(zip(sampler.indices, slopes, strict=True))
+            for index in sampler.indices:
                 if self.record.fresh[row, index]:
                     fresh[index] = int(np.argmin(np.abs(np.array(times) - (t - of.delay))))
         return Instant(number, sampled, fresh)

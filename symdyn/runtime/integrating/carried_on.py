@@ -34,17 +34,17 @@ class CarriedOn:
     t: float
     wanted: np.ndarray
     after: np.ndarray
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
 
     @classmethod
-    def of(cls, module: Module, t: float, wanted: np.ndarray, p: np.ndarray, places: Sequence[int]) -> CarriedOn:
+    def of(cls, module: Module, t: float, wanted: np.ndarray, p: np.ndarray, indices: Sequence[int]) -> CarriedOn:
         """The reset to a state on the constraints. Raises EvaluationError where they do not allow it."""
         projector = Projector(module, p)
         try:
-            after = projector.keeping(t, wanted, places)
+            after = projector.keeping(t, wanted, indices)
         except ProjectionFailed as error:
             raise EvaluationError(f"{module.name}: at t = {t:.9g} s {error}") from None
-        return cls(projector, t, wanted, after, tuple(k for k in sorted(places) if k < projector.n_q + projector.n_u))
+        return cls(projector, t, wanted, after, tuple(k for k in sorted(indices) if k < projector.n_q + projector.n_u))
 
     def carried(self, way: Way, along: np.ndarray, slope: np.ndarray) -> np.ndarray:
         """Derivatives of the state after it: along, (n_x, n_x + 1 + n_carried), those of what it asks for by the state before,
@@ -61,11 +61,11 @@ class CarriedOn:
         onto = np.array([way.weights("corrected_weights", self.t, self.after, row) for row in np.eye(n_x)[:n_q]])
         fixed = along - np.outer(slope, later)
         result[:n_q] = onto[:, :n_x] @ fixed + onto[:, n_x:] @ others + np.outer(slope[:n_q], later)
-        held = [k for k in self.places if k < n_q]
+        held = [k for k in self.indices if k < n_q]
         self._demand_ends(module, onto[:, :n_q], directions[[rows[k] for k in held]], held)
         result[:middle] += self._closing(directions, rows, held, (along - result)[held])
         # Speeds at given impulses.
-        held = [k for k in self.places if k >= n_q]
+        held = [k for k in self.indices if k >= n_q]
         jump, impulses = self._impulses(directions, rows, held)
         for k, column in enumerate(np.vstack([result[:n_q], along[n_q:]]).T):
             given = [name in way.carried for name in (*module.metadata.inputs, *module.metadata.parameters)]
@@ -121,7 +121,7 @@ class CarriedOn:
         """Raises EvaluationError where what is held does not change as the reset does."""
         n_q, middle = self.projector.n_q, self.projector.n_q + self.projector.n_u
         sizes = np.maximum(np.abs(along), np.abs(result))[:middle]
-        for k in self.places:
+        for k in self.indices:
             size = sizes[:n_q] if k < n_q else sizes[n_q:]
             if (np.abs(along[k] - result[k]) > np.maximum(GAP * size.max(axis=0), ROUNDING * sizes.max())).any():
                 raise EvaluationError(f"{module.name}: at t = {self.t:.9g} s {not_smooth(module.metadata.x[k])}")

@@ -107,7 +107,7 @@ class Run:
             self.problem.n_pieces, self.problem.breaks, self.problem.pieces = len(pieces), breaks.ctypes.data, pieces.ctypes.data
         if free.function is not None:
             n_x, n_in, n_state, n_columns = self.n_x, len(constant), request.n_state, len(request.columns)
-            places = [self.library.metadata.inputs.index(name) for name in request.followed]
+            indices = [self.library.metadata.inputs.index(name) for name in request.followed]
 
             def call(t: float, x: Any, out: Any) -> int:
                 if self.trouble:  # the integrator tries smaller steps before it gives up
@@ -115,11 +115,11 @@ class Run:
                 try:
                     guard.check()
                     state = np.ctypeslib.as_array(x, (n_x,)).copy()
-                    values = np.ctypeslib.as_array(out, (n_in + len(places) * n_columns,))
+                    values = np.ctypeslib.as_array(out, (n_in + len(indices) * n_columns,))
                     values[:n_in] = free.at(t, state[:n_state])
-                    if places:
+                    if indices:
                         columns = state[n_state:n_state * (1 + n_columns)].reshape(n_columns, n_state)
-                        values[n_in:] = free.slopes(t, state[:n_state], columns)[places].T.ravel()
+                        values[n_in:] = free.slopes(t, state[:n_state], columns)[indices].T.ravel()
                     return 0
                 except BaseException as error:
                     self.trouble.append(error)

@@ -44,7 +44,7 @@ class ContactChain:
         self.breaks = breaks
         self.module, self.request, self.method, self.carried = module, replace(request, look=None), method, tuple(carried)
         self.switches, self.room = switches, room
-        self.places = {name: k for k, name in enumerate(module.metadata.parameters)}
+        self.indices = {name: k for k, name in enumerate(module.metadata.parameters)}
         self.step = min(LONGEST, request.rtol ** (1 / (method_of(method).order + 1)))
         self.end, self.rows = (float(outcome.t[-1]), outcome.x[-1]), (outcome.t, outcome.x)
         self.n_steps, self.memory = outcome.n_steps, outcome.t.nbytes + outcome.x.nbytes
@@ -91,7 +91,7 @@ class ContactChain:
 
     def _is_held(self, switch: Switch) -> bool:
         """Whether directions of friction are held after a switch."""
-        return HOLDING in self.places and bool(switch.p_after[self.places[HOLDING]] >= HOLDS)
+        return HOLDING in self.indices and bool(switch.p_after[self.indices[HOLDING]] >= HOLDS)
 
     def _forth(self, switch: Switch, until: float, began: float | None, ends: float | None) -> list[Way]:
         """From a switch to the next one; near the begin or end of a slip in space in parts whose steps follow how fast changes
@@ -115,7 +115,7 @@ class ContactChain:
         """The rate at which changes of slips in space across themselves decay, 1/s, the largest one."""
         at, records = numbers(self.module, t, x, p, self.request.inputs.at(t, x)), self.module.metadata.contacts
         result = [turning(at, list(rows[1:])) for rows, record in zip(rows_of(records), records, strict=True)
-                  if record.tangents == 2 and p[self.places[record.closed]] and not p[self.places[record.sticking]]]
+                  if record.tangents == 2 and p[self.indices[record.closed]] and not p[self.indices[record.sticking]]]
         return max(result, default=0.0)
 
     def _across(self, switch: Switch, integral: Integral | None, weights: np.ndarray) -> None:

@@ -69,7 +69,7 @@ class Shifted:
 class Switch:
     """A switch of contacts: when, the states (n_x,) and the parameters, which hold the modes, before and after it.
 
-    events   places of the module's events that set its time, with what messages call them; none: its time is given
+    events   indices of the module's events that set its time, with what messages call them; none: its time is given
     made     the state that it makes of another one, at a time, with parameters and inputs, and what is decided on the way; None:
              the state stays as it is, and only what directions are counted from changes
     since    the time since the switch before, s; inputs: over time

@@ -168,7 +168,7 @@ def onto_rows(of: Callable[[np.ndarray], Numbers], x: np.ndarray, gaps: Mapping[
     of the mass matrix.
 
     of     the numbers at a state
-    gaps   places of contacts with that of their normal row; held: places of rows
+    gaps   indices of contacts with that of their normal row; held: indices of rows
     """
     at, normal, x = of(x), list(gaps.values()), x.copy()
     n_q, n_u = len(at.coordinates), len(at.speeds)
@@ -185,8 +185,8 @@ def onto_rows(of: Callable[[np.ndarray], Numbers], x: np.ndarray, gaps: Mapping[
 
 def ignored(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> list[bool]:
     """Whether each contact is ignored at a state, should it be open."""
-    places = {event.name: k for k, event in enumerate(module.metadata.events)}
-    own = [places[f"{record.name}_{IGNORED}"] if IGNORED in record.events else -1 for record in module.metadata.contacts]
+    indices = {event.name: k for k, event in enumerate(module.metadata.events)}
+    own = [indices[f"{record.name}_{IGNORED}"] if IGNORED in record.events else -1 for record in module.metadata.contacts]
     if max(own) < 0:
         return [False] * len(own)
     values = module.evaluate("events", t, x[:module.metadata.sizes.x], p, inputs)
@@ -228,9 +228,9 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
         below = [k for k, gap in enumerate(now.gap) if gap < 0 and counts[k]]
         if not below:
             break
-        places = [first[k] for k in below]
-        push = least_solution(now.D[np.ix_(places, places)], -now.gap[below])
-        moved[:n_q] += now.coordinates[:, places] @ push
+        indices = [first[k] for k in below]
+        push = least_solution(now.D[np.ix_(indices, indices)], -now.gap[below])
+        moved[:n_q] += now.coordinates[:, indices] @ push
     depths = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
     names = module.metadata.q
     lifted = all(gap >= -TOUCHING for k, gap in enumerate(numbers(module, t, moved, p, inputs).gap) if counts[k])
@@ -320,8 +320,8 @@ class _Table:
         self.clutches = [k for k, record in enumerate(self.records) if record.kind == CLUTCH]
         self.placed = [k for k, record in enumerate(self.records) if record.normal and record.kind != CLUTCH]  # by positions
         self.frictions = [k for k, record in enumerate(self.records) if not record.normal]
-        self.place = {name: k for k, name in enumerate(metadata.parameters)}
-        missing = [name for record in self.records for name in record.parameters if name not in self.place]
+        self.parameter_index = {name: k for k, name in enumerate(metadata.parameters)}
+        missing = [name for record in self.records for name in record.parameters if name not in self.parameter_index]
         if missing:
             raise ArgumentError(f"{module.name}: the parameters {', '.join(missing)} say in which mode contacts are, and a "
                                 "run sets them; leave them out of specialize")
@@ -351,7 +351,7 @@ class _Phases:
         table: _Table = self.module._remembered("contact_table", lambda: _Table(self.module))
         self.records, self.rows, self.normal, self.tangents = table.records, table.rows, table.normal, table.tangents
         self.clutches, self.placed, self.frictions = table.clutches, table.placed, table.frictions
-        self.place, self.events, self.of_event = table.place, table.events, table.of_event
+        self.parameter_index, self.events, self.of_event = table.parameter_index, table.events, table.of_event
         self.n_steps = 0
         n = len(self.records)
         self.modes = [OPEN] * n
@@ -703,7 +703,7 @@ class _Phases:
     def _held(self, p: np.ndarray) -> np.ndarray:
         """Parameters with which directions of friction in space are held."""
         p = p.copy()
-        p[self.place[HOLDING]] = HOLDS
+        p[self.parameter_index[HOLDING]] = HOLDS
         return p
 
     def _held_until(self, t: float, x: np.ndarray) -> float:
@@ -737,14 +737,14 @@ class _Phases:
         p = self.request.p.copy()
         for record, mode, direction, soft in zip(self.records, self.modes, self.directions, self.softness, strict=True):
             if record.closed:
-                p[self.place[record.closed]] = mode != OPEN
+                p[self.parameter_index[record.closed]] = mode != OPEN
             if record.sticking:
-                p[self.place[record.sticking]] = mode == STICKING
+                p[self.parameter_index[record.sticking]] = mode == STICKING
                 given = direction if mode == SLIDING else soft if self.shared and mode == STICKING else (0.0, 0.0)
                 for name, value in zip(record.sliding, given, strict=False):
-                    p[self.place[name]] = value
-        p[self.place[SHARED]] = SOFTNESS if self.shared else 0.0
-        return self._held(p) if self.begins.directions and HOLDING in self.place else p
+                    p[self.parameter_index[name]] = value
+        p[self.parameter_index[SHARED]] = SOFTNESS if self.shared else 0.0
+        return self._held(p) if self.begins.directions and HOLDING in self.parameter_index else p
 
     def _looked_for(self) -> np.ndarray:
         """Events of the user, and those of contacts that their modes can end with."""
@@ -989,12 +989,12 @@ class _Phases:
     def _impact(self, t: float, x: np.ndarray, at: Numbers, touching: Sequence[int],
                 hit: Sequence[int]) -> tuple[np.ndarray, list[int]]:
         """The state after an impact, and the contacts that leave."""
-        places = [row for k in touching for row in self.rows[k]]
+        indices = [row for k in touching for row in self.rows[k]]
         sites = self._sites(at, touching, impact=True)
-        v = at.slip[places]
+        v = at.slip[indices]
         law = self.records[hit[0]].impact
         names = ", ".join(self.records[k].name for k in hit)
-        D = at.D[np.ix_(places, places)]
+        D = at.D[np.ix_(indices, indices)]
         if law == STRONGE:
             if len(touching) > 1:
                 raise _Stop(f"the impact of {names} is one of {len(touching)} contacts at once, "
@@ -1013,14 +1013,14 @@ class _Phases:
         one = result[0]
         n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
         after = x.copy()
-        after[n_q:n_q + n_u] += at.speeds[:, places] @ one.lam
+        after[n_q:n_q + n_u] += at.speeds[:, indices] @ one.lam
         gained = float((v + one.w) @ one.lam) / 2
         size = float(np.abs(v) @ np.abs(one.lam))
         if gained > GAINED * size and gained > 1e-12 * self._kinetic_energy(t, x):
             self._doubt("energy", t, touching, f"the impact of {names} at t = {t:.9g} s adds {gained:.3g} J, as Newton's law may "
                         "with friction or several contacts; pass impact='poisson'", gained)
         impulses = np.zeros(len(at.slip))
-        impulses[places] = one.lam
+        impulses[indices] = one.lam
         self.impacts.append(Impact(t, impulses, at.slip, self._numbers(t, after).slip))
         stays = NO_SPEED * np.abs(v).max()
         rebound, k_row = [], 0
@@ -1090,11 +1090,11 @@ class _Phases:
         """Whether contacts in space that stick and share forces hold by other shares than those with which some have left their
         cones; these are taken then. Those that nothing pressed before take their share."""
         at, closed = self._numbers(t, x), [k for k, mode in enumerate(self.modes) if mode != OPEN]
-        places = [row for k in closed for row in self.rows[k]]
+        indices = [row for k in closed for row in self.rows[k]]
         modes = [Mode(STICKING, np.zeros(2), True) if self._is_light(k) else
                  Mode(self.modes[k], self.directions[k], True, self.still[k] and self.modes[k] == SLIDING) for k in closed]
         sites = self._sites(at, closed)
-        one = held(at.D[np.ix_(places, places)], at.free[places], sites, modes, least=False)
+        one = held(at.D[np.ix_(indices, indices)], at.free[indices], sites, modes, least=False)
         if one is None:
             return False
         for k, mode in zip(closed, one.modes, strict=True):
@@ -1155,13 +1155,13 @@ class _Phases:
         if not candidates:
             return []
         p, n, end = self._parameters(), self.request.n_state, self.request.span[1]
-        places, sizes = [self.events[k][what] for k, what in candidates], np.array(list(candidates.values()))
-        now = self._values("events", t, x[:n], p)[places]
+        indices, sizes = [self.events[k][what] for k, what in candidates], np.array(list(candidates.values()))
+        now = self._values("events", t, x[:n], p)[indices]
         rate = self._values("rhs", t, x[:n], p).copy()
-        unknown, result = now < 0, np.zeros(len(places), dtype=bool)
+        unknown, result = now < 0, np.zeros(len(indices), dtype=bool)
         after = max(SHORTEST * self.begins.length, 64 * np.finfo(float).eps * abs(t))
         while unknown.any() and after <= min(LONGEST * self.begins.length, end - t):
-            change = self._values("events", t + after, self._stepped(t, x, rate, p, after), p)[places] - now
+            change = self._values("events", t + after, self._stepped(t, x, rate, p, after), p)[indices] - now
             known = unknown & (np.abs(change) > RESOLVED * sizes)
             result |= known & (change < 0)
             unknown &= ~known
@@ -1170,16 +1170,16 @@ class _Phases:
 
     def _choose(self, t: float, x: np.ndarray, at: Numbers, closed: Sequence[int]) -> np.ndarray:
         """The modes of the contacts that are closed, from the accelerations; the others are open. The forces of all rows."""
-        places = [row for k in closed for row in self.rows[k]]
-        D, b = at.D[np.ix_(places, places)], at.free[places]
-        result = solutions(D, b, self._sites(at, closed)) if places else []
-        if places and not result and self.ruled_out:  # an acceleration that begins at zero has the sign of rounding
+        indices = [row for k in closed for row in self.rows[k]]
+        D, b = at.D[np.ix_(indices, indices)], at.free[indices]
+        result = solutions(D, b, self._sites(at, closed)) if indices else []
+        if indices and not result and self.ruled_out:  # an acceleration that begins at zero has the sign of rounding
             later = self._numbers(*self._a_moment_later(t, x))
-            result = solutions(later.D[np.ix_(places, places)], later.free[places], self._sites(at, closed))
-        if places and not result and self.ruled_out:
+            result = solutions(later.D[np.ix_(indices, indices)], later.free[indices], self._sites(at, closed))
+        if indices and not result and self.ruled_out:
             self.ruled_out = {}
             result = solutions(D, b, self._sites(at, closed))
-        if places and not result:
+        if indices and not result:
             names = ", ".join(self.records[k].name for k in closed)
             raise _Stop(f"contacts {names}: no accelerations fulfil the laws of contact and friction (Painleve's paradox: "
                         "friction pushes the bodies into each other faster than any force separates them); less friction, or "
@@ -1208,7 +1208,7 @@ class _Phases:
                                          if self.modes[k] == SLIDING})
         forces = np.zeros(len(at.free))
         if result:
-            forces[places] = result[0].lam
+            forces[indices] = result[0].lam
         self.pressed = float(np.abs(forces).max(initial=0.0))
         return forces
 
@@ -1297,7 +1297,7 @@ class _Phases:
         across these, with the normal impulses that keep contacts closed and their friction."""
         across = {k: np.array([-d[1], d[0]]) for k, d in held.items() if len(d) == 2}
         closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
-        places = [row for k in closed for row in self.rows[k]]
+        indices = [row for k in closed for row in self.rows[k]]
         at = self._numbers(t, x)
         columns, kept = [], []
         for k in closed if across else ():
@@ -1316,10 +1316,10 @@ class _Phases:
                 kept.append(row)
         if not columns:
             return x
-        H, G = np.array(columns).T[places], np.array(kept)[:, places]
-        impulse = H @ least_solution(G @ at.D[np.ix_(places, places)] @ H, -G @ at.slip[places])
+        H, G = np.array(columns).T[indices], np.array(kept)[:, indices]
+        impulse = H @ least_solution(G @ at.D[np.ix_(indices, indices)] @ H, -G @ at.slip[indices])
         n_q, n_u, x = len(at.coordinates), len(at.speeds), x.copy()
-        x[n_q:n_q + n_u] += at.speeds[:, places] @ impulse
+        x[n_q:n_q + n_u] += at.speeds[:, indices] @ impulse
         return x
 
     def _named(self, chosen: Sequence[int], one: Solved) -> str:
@@ -1331,11 +1331,11 @@ class _Phases:
         if not rebound:
             return []
         closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
-        places = [row for k in closed for row in self.rows[k]]
+        indices = [row for k in closed for row in self.rows[k]]
         lam = np.zeros(len(at.free))
-        if places:
-            result = solutions(at.D[np.ix_(places, places)], at.free[places], self._sites(at, closed))
-            lam[places] = result[0].lam if result else 0.0
+        if indices:
+            result = solutions(at.D[np.ix_(indices, indices)], at.free[indices], self._sites(at, closed))
+            lam[indices] = result[0].lam if result else 0.0
         w = at.free + at.D @ lam
         begin, end = self.request.span
         shortest = max(SHORTEST_FLIGHT * (end - begin), 1e4 * np.finfo(float).eps * abs(t))

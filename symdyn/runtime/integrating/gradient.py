@@ -202,6 +202,6 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
 
 def _chosen(asked: Asked, carried: Sequence[str], weights: np.ndarray) -> np.ndarray:
     n_x = asked.starts.shape[1]
-    places = {name: n_x + k for k, name in enumerate(carried)}
-    return np.array([weights[places[name]] if name else start @ weights[:n_x]
+    indices = {name: n_x + k for k, name in enumerate(carried)}
+    return np.array([weights[indices[name]] if name else start @ weights[:n_x]
                      for name, start in zip(asked.columns, asked.starts, strict=True)])

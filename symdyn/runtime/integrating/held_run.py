@@ -124,7 +124,7 @@ class _Pieces:
         left = None if request.max_steps is None else request.max_steps - self.n_steps
         outcome = self.part(replace(request, span=(t, until), times=times, x0=x, first_step=step, max_steps=left,
                                     inputs=self.inputs, carried=self.carried,
-                                    input_columns=self.input_columns[request.inputs.places]))
+                                    input_columns=self.input_columns[request.inputs.indices]))
         rows = np.ones(len(outcome.t), dtype=bool)
         if wanted is not None:
             rows = np.isin(outcome.t, wanted)

@@ -104,9 +104,9 @@ class Jump:
         """Derivatives of the state after resets by that before, by the time, and by what is carried."""
         n_x = len(self.x)
         by_x, by_t, by_others = np.eye(n_x), np.zeros(n_x), np.zeros((n_x, len(self.way.carried)))
-        places, rows = self.resets()
-        if places:
-            by_x[places], by_t[places], by_others[places] = (d[rows] for d in self.derivatives("event_resets"))
+        indices, rows = self.resets()
+        if indices:
+            by_x[indices], by_t[indices], by_others[indices] = (d[rows] for d in self.derivatives("event_resets"))
         if self.reset is None or self.slope_after is None:
             return by_x, by_t, by_others
         whole = self.reset.carried(self.way, np.column_stack([by_x, by_t, by_others]), self.slope_after)
@@ -114,13 +114,13 @@ class Jump:
 
     def go_on(self, after: np.ndarray) -> np.ndarray:
         """The state after the resets; after: that before them, which is changed."""
-        module, p, places = self.way.module, self.way.request.p, self.resets()[0]
-        if not places:
+        module, p, indices = self.way.module, self.way.request.p, self.resets()[0]
+        if not indices:
             return after
         values = module.evaluate("event_resets", self.t, self.x, p, Field(module, self.way.request).inputs(self.t, self.x))
-        after[places] = values[self.resets()[1]]
-        if module.metadata.constraints and any(index < module.metadata.sizes.q + module.metadata.sizes.u for index in places):
-            self.reset = CarriedOn.of(module, self.t, after, p, places)
+        after[indices] = values[self.resets()[1]]
+        if module.metadata.constraints and any(index < module.metadata.sizes.q + module.metadata.sizes.u for index in indices):
+            self.reset = CarriedOn.of(module, self.t, after, p, indices)
             return self.reset.after
         return after
 

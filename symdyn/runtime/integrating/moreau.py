@@ -244,7 +244,7 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
     sizes = np.linalg.norm(slips, axis=2, keepdims=True)
     along = np.where((modes == SLIDING)[:, :, None] & (sizes > 0), slips / np.where(sizes > 0, sizes, 1.0), 0.0)
     phases: list[Phase] = []
-    places, latest = [], None
+    indices, latest = [], None
     for k in steps.tolist() if len(stepped.h) else []:
         here = (modes[k].tobytes(), along[k].tobytes())
         if here != latest:
@@ -258,8 +258,8 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
                 p[names.index(SHARED)] = SOFTNESS * (np.count_nonzero(modes[k]) > 1)
             phases.append(Phase(float(stepped.t[k]), p, tuple(MODES[mode] for mode in modes[k].tolist())))
             latest = here
-        places.append(len(phases) - 1)
-    return phases, np.array(places, dtype=int)
+        indices.append(len(phases) - 1)
+    return phases, np.array(indices, dtype=int)
 
 
 class Stepper:
@@ -292,18 +292,18 @@ class Stepper:
         self.cones: Cones = cones(memory, sizes.u, most, entries, min(LATE_DENSE if many else MOST_DENSE, 3 * most))
         self.cones.late = int(many)
         self.library = shared("moreau", require_compiler())
-        places = np.dtype("long")
-        memory.take(record, "given_first", first.astype(places))
+        index_type = np.dtype("long")
+        memory.take(record, "given_first", first.astype(index_type))
         memory.take(record, "given_kind", np.array([*(KINDS.get(c.kind, STATUS.PLACED) for c in metadata.contacts), 0],
                                                    dtype=np.intc))
         coordinates = metadata.names("q")
         index = {q: k for k, q in enumerate(coordinates)}
         record.n_units = len(metadata.unit_groups)
-        memory.take(record, "unit_first", np.cumsum([0, *map(len, metadata.unit_groups)]).astype(places))
+        memory.take(record, "unit_first", np.cumsum([0, *map(len, metadata.unit_groups)]).astype(index_type))
         memory.take(record, "unit_index",
-                    np.array([*(index[q] for group in metadata.unit_groups for q in group), 0], dtype=places))
+                    np.array([*(index[q] for group in metadata.unit_groups for q in group), 0], dtype=index_type))
         listed = ("a", "b", "was_a", "was_b", "was_at", "sum_a", "sum_b", "old_a", "old_b")
-        memory.put(record, places, **dict.fromkeys(listed, most), old_from=record.n_bodies + 1)
+        memory.put(record, index_type, **dict.fromkeys(listed, most), old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
         memory.put(record, float, given_was=2 * n_given, work=8 * n_x, at_end=4 * most, basis=9 * most,
                    **dict.fromkeys(("P_old", "P_guess", "incoming"), 3 * most))
@@ -366,17 +366,17 @@ class Stepper:
         most, self.step = max(1, int(self.cones.most)), h
         room = most * max(2, min(n, 200_000 // most + 2))
         out, ends = np.zeros((n, len(self.x))), np.zeros(n, dtype=np.dtype("long"))
-        places, values, missed = np.zeros((room, 3), dtype=np.dtype("long")), np.zeros((room, 10)), np.zeros(n)
+        indices, values, missed = np.zeros((room, 3), dtype=np.dtype("long")), np.zeros((room, 10)), np.zeros(n)
         done, span = ctypes.c_long(0), np.array([t, h])
         status = self.library.symdyn_moreau_go(
             ctypes.byref(self.record), ctypes.byref(self.cones), *[ctypes.c_void_p(a.ctypes.data) for a in (span, self.x)],
-            ctypes.c_long(n), *[ctypes.c_void_p(a.ctypes.data) for a in (out, ends, places, values, missed)],
+            ctypes.c_long(n), *[ctypes.c_void_p(a.ctypes.data) for a in (out, ends, indices, values, missed)],
             ctypes.c_long(room), ctypes.byref(done))
         k = done.value
         number = int(ends[k - 1]) if k else 0
         self.now = t + k * h
         per_step = np.diff(np.append(0, ends[:k]))
-        a, b, state = places[:number].T.copy()
+        a, b, state = indices[:number].T.copy()
         self.parts.append(Touched(len(self.h) + np.repeat(np.arange(k), per_step), a, b, state, values[:number].copy()))
         self.missed += missed[:k].tolist()
         self.t += [t + i * h for i in range(k)]

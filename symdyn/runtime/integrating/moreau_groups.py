@@ -69,15 +69,15 @@ def check_spheres_apart(module: Module, t: float, x: np.ndarray, p: np.ndarray, 
 
 def add_groups(module: Module, record: Moreau, memory: Memory) -> None:
     """Add groups of contacts to the record."""
-    groups, places = module.metadata.contact_groups, np.dtype("long")
+    groups, index_type = module.metadata.contact_groups, np.dtype("long")
     bodies, planes = [len(group.bodies) for group in groups], [group.planes for group in groups]
     n, kind = sum(bodies), n_speeds(groups)
     record.n_groups, record.n_bodies, record.n_planes, record.n_speeds = len(groups), n, sum(planes), kind
     record.planar, record.n_table = int(module.metadata.planar), 2 * n + 1
-    memory.take(record, "group_of", np.repeat(np.arange(len(groups)), bodies).astype(places))
-    memory.take(record, "plane_group", np.append(np.repeat(np.arange(len(groups)), planes), 0).astype(places))
-    memory.take(record, "speed_of", np.array([u for group in groups for u in group.speeds], dtype=places))
-    memory.put(record, places, cell=3 * n, next=n, table=record.n_table)
+    memory.take(record, "group_of", np.repeat(np.arange(len(groups)), bodies).astype(index_type))
+    memory.take(record, "plane_group", np.append(np.repeat(np.arange(len(groups)), planes), 0).astype(index_type))
+    memory.take(record, "speed_of", np.array([u for group in groups for u in group.speeds], dtype=index_type))
+    memory.put(record, index_type, cell=3 * n, next=n, table=record.n_table)
     memory.put(record, float, response=6 * kind * n, was=3 * n)
 
 

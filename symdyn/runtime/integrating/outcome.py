@@ -16,7 +16,7 @@ from symdyn.runtime.integrating.stabilization import Corrections, Stabilization
 
 
 class Touched(NamedTuple):
-    """Contacts in steps, one row for each contact and step: index of the step, places of the contact, state (0 open, 1
+    """Contacts in steps, one row for each contact and step: index of the step, indices of the contact, state (0 open, 1
     sticking, 2 sliding), values: gap and velocities (3) at its end, impulses (3), velocities (3) at its begin."""
 
     step: np.ndarray

@@ -85,8 +85,8 @@ class Asked:
         in its own root mean square: they count in that of all entries.
         """
         rtol, atol = tolerances(request.rtol, request.atol, self.sizes, controlled)
-        names = [name for k, name in enumerate(inputs) if k in request.inputs.places] if request.inputs.are_held else []
-        followed = [inputs[index] for places, *_ in request.inputs.gradients for index in places]
+        names = [name for k, name in enumerate(inputs) if k in request.inputs.indices] if request.inputs.are_held else []
+        followed = [inputs[index] for indices, *_ in request.inputs.gradients for index in indices]
         return replace(request, held=tuple(names), followed=tuple(followed), rtol=rtol,
                        x0=np.concatenate([request.x0, self.starts.ravel()]), atol=atol, columns=self.columns)
 
@@ -107,7 +107,7 @@ class Asked:
         if any(one.sampled.gradient is None for one in request.inputs.samplers):
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but the derivatives of a sampled controller by "
                                 "the state are not known; pass sd.Sampled(function, period, gradient=...), a function of (t, x)")
-        unknown = _depend_on_state(request) - {index for places, *_ in request.inputs.gradients for index in places}
+        unknown = _depend_on_state(request) - {index for indices, *_ in request.inputs.gradients for index in indices}
         if unknown:
             names = ", ".join(module.metadata.inputs[k] for k in sorted(unknown))
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "

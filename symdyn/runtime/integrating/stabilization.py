@@ -131,32 +131,32 @@ class Projector:
         wanted, u = x.copy(), x[self.n_q:middle].copy()
         for part in (slice(0, self.n_q), slice(self.n_q, middle)):
             rows = [r for r, k in enumerate(known) if k in held and part.start <= k < part.stop]
-            places = [known[r] for r in rows]
+            indices = [known[r] for r in rows]
             x[self.n_q:middle] = u
             x = self(t, x)
-            self._close(t, x, wanted, rows, places)
+            self._close(t, x, wanted, rows, indices)
         return x
 
-    def _close(self, t: float, x: np.ndarray, wanted: np.ndarray, rows: Sequence[int], places: Sequence[int]) -> None:
-        """Bring the entries `places` of x to what is wanted, by Newton's method along `rows` of the function reset_directions."""
-        if not places:
+    def _close(self, t: float, x: np.ndarray, wanted: np.ndarray, rows: Sequence[int], indices: Sequence[int]) -> None:
+        """Bring the entries `indices` of x to what is wanted, by Newton's method along `rows` of reset_directions."""
+        if not indices:
             return
-        of_speeds = places[0] >= self.n_q
+        of_speeds = indices[0] >= self.n_q
         factors = np.concatenate([self.lengths, self.velocities])
         sizes = np.abs(x[:len(factors)] * factors)
-        asked = float((np.abs(wanted - x)[places] * factors[places]).max())
+        asked = float((np.abs(wanted - x)[indices] * factors[indices]).max())
         size = max(1e-5 * self.length, sizes[self.n_q:].max(), asked) if of_speeds else self.length
         allowed = _TOO_MUCH[1] if of_speeds else max(_TOO_MUCH[0], 4 * _RESOLVED * sizes[:self.n_q].max() / self.length)
         worst = np.inf
         for _ in range(_ROUNDS + 1):
-            gaps = (wanted - x)[places]
-            before, parts = worst, np.abs(gaps) * factors[places] / size
-            worst, entry, left = float(parts.max()), places[int(parts.argmax())], float(np.abs(gaps)[int(parts.argmax())])
+            gaps = (wanted - x)[indices]
+            before, parts = worst, np.abs(gaps) * factors[indices] / size
+            worst, entry, left = float(parts.max()), indices[int(parts.argmax())], float(np.abs(gaps)[int(parts.argmax())])
             if worst <= 1e-15 or worst > 0.7 * before:
                 break
             try:
                 directions = self.directions(t, x)[rows]
-                x[:len(factors)] += self.impulses(directions, places, gaps) @ directions
+                x[:len(factors)] += self.impulses(directions, indices, gaps) @ directions
                 x[:] = self(t, x)
             except ProjectionFailed:
                 worst = np.inf
@@ -168,14 +168,14 @@ class Projector:
         """The function reset_directions, (n, n_q + n_u)."""
         return self._evaluate("reset_directions", t, x).reshape(-1, self.n_q + self.n_u)
 
-    def impulses(self, directions: np.ndarray, places: Sequence[int], gaps: np.ndarray) -> np.ndarray:
-        """Impulses that close gaps (n, ...) of entries `places` along their directions (n, n_q + n_u), likewise."""
-        factors, n = np.concatenate([self.lengths, self.velocities]), len(places)
-        own = np.diag(directions[:, places]) * factors[places]
+    def impulses(self, directions: np.ndarray, indices: Sequence[int], gaps: np.ndarray) -> np.ndarray:
+        """Impulses that close gaps (n, ...) of entries `indices` along their directions (n, n_q + n_u), likewise."""
+        factors, n = np.concatenate([self.lengths, self.velocities]), len(indices)
+        own = np.diag(directions[:, indices]) * factors[indices]
         # Directions that would take the others a million times as far are held by the constraints.
         free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
         result = np.zeros((n, *gaps.shape[1:]))
-        result[free] = _multipliers(directions[free][:, np.array(places)[free]].T, gaps[free])
+        result[free] = _multipliers(directions[free][:, np.array(indices)[free]].T, gaps[free])
         return result
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:

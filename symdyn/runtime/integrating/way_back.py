@@ -44,13 +44,13 @@ def _pointers(*arrays: np.ndarray | None) -> list[ctypes.c_void_p]:
 
 
 class Feedback:
-    """Inputs that follow the state by functions with gradients: their places among what weights are carried to besides x."""
+    """Inputs that follow the state by functions with gradients: their indices among what weights are carried to besides x."""
 
     def __init__(self, module: Module, inputs: Inputs, carried: Sequence[str]) -> None:
         self._given = inputs
-        self._inputs = [index for places, *_ in inputs.gradients for index in places]
+        self._inputs = [index for indices, *_ in inputs.gradients for index in indices]
         self.names = [module.metadata.inputs[index] for index in self._inputs]
-        self.places = np.array([carried.index(name) for name in self.names if name in carried], dtype=ctypes.c_long)
+        self.indices = np.array([carried.index(name) for name in self.names if name in carried], dtype=ctypes.c_long)
 
     def slopes(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Derivatives of these inputs by the state at times (n,) and states (n, n_x), (n, n_followed, n_x)."""
@@ -60,8 +60,8 @@ class Feedback:
 
     def fold(self, t: float, x: np.ndarray, weights: np.ndarray) -> None:
         """Make weights of these inputs, behind those of x (n_x,), weights of x."""
-        if len(self.places):
-            at = len(x) + self.places
+        if len(self.indices):
+            at = len(x) + self.indices
             weights[:len(x)] += weights[at] @ self.slopes(np.array([t]), x[None, :])[0]
             weights[at] = 0.0
 
@@ -111,7 +111,7 @@ class Way:
             self.b[k] = factor
         self.n_x, self.width = len(request.x0), len(request.x0) + len(carried)
         self.stretch, self.kept = STRETCH, [self.run.checkpoint()]
-        self.steps: dict[int, _Steps] = {}  # by the place of their stretch
+        self.steps: dict[int, _Steps] = {}  # by the index of their stretch
         self.n_steps, self.memory = 0, 0
         self.end: tuple[float, np.ndarray] = (request.span[0], request.x0)
         self._spare: _Steps | None = None
@@ -254,14 +254,14 @@ class Way:
             here = slice(begin * self.stages, end * self.stages)
             of_x = np.ascontiguousarray(costs.by_x[here])
             of_others = None if costs.by is None else np.ascontiguousarray(costs.by[here])
-        places = self.feedback.places
+        indices = self.feedback.indices
         times, states = times[begin:end], states[begin:end]
-        feedback = self.feedback.slopes(times.ravel(), states.reshape(-1, self.n_x)) if len(places) else None
+        feedback = self.feedback.slopes(times.ravel(), states.reshape(-1, self.n_x)) if len(indices) else None
         with self.run.guard:
             reason = self.library.function("simulation_back")(
                 ctypes.byref(self.run.problem), ctypes.c_long(end - begin),
                 *_pointers(self.A, self.b, steps.h[begin:], steps.x[begin + 1:], times, states, of_x, of_others),
-                ctypes.c_long(len(places)), *_pointers(places, feedback, weights))
+                ctypes.c_long(len(indices)), *_pointers(indices, feedback, weights))
         if self.run.trouble:
             raise self.run.trouble[0]
         if reason:

@@ -160,7 +160,7 @@ class GroupMotion(NamedTuple):
     """Contacts of a group along a motion by time stepping, one row for each that was near in the step before a stored time.
 
     row       index of that time, (n,)
-    a, b      places of both bodies in the group; from the number of its bodies on b counts its planes
+    a, b      indices of both bodies in the group; from the number of its bodies on b counts its planes
     mode      "open", "sticking" or "sliding"
     gap       m, at the end of the step
     normal    normal force, N; friction: size of the tangential force, N; both are the impulse by the length of the step

@@ -35,7 +35,7 @@ class Sensitivity(Mapping[Any, np.ndarray]):
 
         Raises ArgumentError for what the run was not asked for.
         """
-        return self.matrix[:, :, self._place(name)]
+        return self.matrix[:, :, self._index(name)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -70,7 +70,7 @@ class Sensitivity(Mapping[Any, np.ndarray]):
         """
         return np.ascontiguousarray(np.swapaxes(self._solution.states_and_columns(t)[1], -1, -2))
 
-    def _place(self, name: Any) -> int:
+    def _index(self, name: Any) -> int:
         asked = name_of(name)
         if asked in self.names:
             return self.names.index(asked)

@@ -127,9 +127,9 @@ class Solution:
                 raise ArgumentError(f"{self.module.name}: the motion holds no time at all: {self.message}")
             raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
                                 f"its state was asked for at t = {outside.flat[0]:.9g} s")
-        times, places = np.unique(asked, return_inverse=True)
+        times, indices = np.unique(asked, return_inverse=True)
         result = self._repeat(times)
-        return result[places.reshape(asked.shape)]
+        return result[indices.reshape(asked.shape)]
 
     def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
         """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
