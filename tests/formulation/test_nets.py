@@ -13,6 +13,7 @@ from symdyn.cli import main
 from symdyn.errors import ArgumentError, EvaluationError, ModelError, ModelWarning
 from symdyn.formulation.constraints import saddle
 from symdyn.formulation.constraints.null_space import least_operations
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.lab import nets
 from symdyn.lab.nets import by_hand, moving, net
 from symdyn.runtime.building.compiler import find_compiler
@@ -30,11 +31,11 @@ def test_the_least_of_operations_is_that_of_the_reduced_mass_matrix() -> None:
     matrix, with factors of n (n^2 - 1) / 6 products; one row over all, which ties the n - 1 others to each other, by one product
     each."""
     n = 6
-    chain = np.eye(n - 1, n, dtype=bool) | np.eye(n - 1, n, 1, dtype=bool)
-    assert least_operations(chain, np.eye(n, dtype=bool), [(k, k) for k in range(n - 1)]) == 2 * (n - 1) - 1
-    assert least_operations(np.zeros((0, n), dtype=bool), np.ones((n, n), dtype=bool), []) == n * (n**2 - 1) // 6
+    chain, diagonal = Sampled.of((np.eye(n - 1, n) + np.eye(n - 1, n, 1))[None]), Sampled.of(np.eye(n)[None])
+    assert least_operations(chain, diagonal, [(k, k) for k in range(n - 1)]) == 2 * (n - 1) - 1
+    assert least_operations(Sampled.of(np.zeros((1, 0, n))), Sampled.of(np.ones((1, n, n))), []) == n * (n**2 - 1) // 6
     factors = (n - 1) * ((n - 1)**2 - 1) // 6
-    assert least_operations(np.ones((1, n), dtype=bool), np.eye(n, dtype=bool), [(0, 0)]) == factors + n * (n - 1) // 2
+    assert least_operations(Sampled.of(np.ones((1, 1, n))), diagonal, [(0, 0)]) == factors + n * (n - 1) // 2
 
 
 def test_without_the_numeric_algorithm(monkeypatch: pytest.MonkeyPatch) -> None:

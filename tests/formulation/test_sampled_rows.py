@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 import symdyn as sd
 from symdyn.formulation.constraints import sampled
-from symdyn.formulation.constraints.null_space import elimination_order
+from symdyn.formulation.constraints.null_space import elimination_order, least_operations
 from symdyn.formulation.constraints.sampled import Sampled, minimum_degree
-from symdyn.formulation.probes.definite import smallest_eigenvalue
+from symdyn.formulation.probes.contradictions import _combinations
+from symdyn.formulation.probes.definite import definite, definite_along
 from symdyn.formulation.probes.dependent_rows import search
 
 
@@ -106,9 +108,39 @@ def test_pivots_follow_markowitz() -> None:
     """The pivot is an admitted entry of least (r - 1) (c - 1), the largest of these, whatever stands at indices that are used
     up."""
     A = np.array([[2.0, 1.0, 0.0, 0.0], [1.0, 5.0, 1.0, 1.0], [0.0, 1.0, 0.1, 3.0]])
-    order = elimination_order(A, A != 0)
+    order = elimination_order(Sampled.of(A[None]))
     assert order is not None and order[0] == (0, 0)
     assert sorted(row for row, _ in order) == [0, 1, 2] and len({column for _, column in order}) == 3
+
+
+def test_the_least_operations_of_an_elimination() -> None:
+    """Counted with full matrices of truths, entry by entry."""
+    stream = np.random.default_rng(4)
+    for m, n in ((1, 1), (3, 5), (8, 12), (10, 10)):
+        A = np.eye(m, n) + (stream.uniform(size=(m, n)) < 0.2)
+        mass = np.eye(n) + (stream.uniform(size=(n, n)) < 0.1)
+        mass = mass + mass.T
+        pivots = [(k, k) for k in stream.permutation(m).tolist()]
+        rows = [k for k, _ in pivots]
+        free = list(range(m, n))
+        left, right = A[np.ix_(rows, rows)] > 0, A[np.ix_(rows, free)] > 0
+        for k in range(m):  # elimination as of numbers, where nothing cancels
+            for i in range(k + 1, m):
+                left[i, k:] |= left[i, k] & left[k, k:]
+                right[i] |= left[i, k] & right[k]
+        for k in range(m - 1, -1, -1):
+            right[:k] |= left[:k, k, None] & right[k]
+        Z = np.zeros((n, len(free)), dtype=int)
+        Z[rows], Z[free, range(len(free))] = right, 1
+        MZ = (mass @ Z > 0).astype(int)
+        products = Z[rows].T @ MZ[rows]
+        wanted = sum(max(2 * products[a, b] - 1, 0) for a in range(len(free)) for b in range(a + 1))
+        near = Z.T @ MZ > 0
+        for k in range(len(free) - 1, -1, -1):
+            others = [a for a in range(k) if near[k, a]]
+            near[np.ix_(others, others)] = True
+            wanted += len(others) * (len(others) + 1) // 2
+        assert least_operations(Sampled.of(A[None]), Sampled.of(mass[None]), pivots) == wanted
 
 
 def test_contradictions_are_found_where_independence_is_looked_at_by_sparse_factors(sparse: None) -> None:
@@ -130,15 +162,44 @@ def test_contradictions_are_found_where_independence_is_looked_at_by_sparse_fact
             assert len(system.augmented().constraints) == 1
 
 
-def test_the_smallest_eigenvalue_is_found_block_by_block() -> None:
-    stream = np.random.default_rng(8)
-    for sizes in ((1, 1, 1), (4,), (1, 3, 2, 1), (2, 2)):
-        whole = np.zeros((sum(sizes), sum(sizes)))
-        first = 0
-        for n in sizes:
-            A = stream.normal(size=(n, n))
-            whole[first:first + n, first:first + n] = A + A.T
-            first += n
-        order = stream.permutation(len(whole))
-        M = whole[np.ix_(order, order)]
-        np.testing.assert_allclose(smallest_eigenvalue(M), np.linalg.eigvalsh(M)[0], rtol=1e-12)
+@pytest.mark.parametrize("m, n, dependent", [(6, 9, 0), (12, 20, 2), (30, 44, 9), (5, 5, 5), (1, 3, 0)])
+def test_combinations_of_rows_by_sparse_factors_are_those_of_rows_one_by_one(request: pytest.FixtureRequest, m: int, n: int,
+                                                                            dependent: int) -> None:
+    """The same at all states; of rows that are combinations at each state, with other factors, none is found."""
+    A = matrices(m, n, dependent, m + n)
+    stream = np.random.default_rng(m)
+    pairs, factors = stream.integers(0, m, (dependent, 2)), stream.uniform(0.5, 2, (2, dependent, 1))
+    constant = factors[0] * A[:, pairs[:, 0]] - factors[1] * A[:, pairs[:, 1]]
+    A = np.concatenate([A, constant], axis=1)[:, stream.permutation(m + 2 * dependent)]
+    usual = list(_combinations(Sampled.of(A)))
+    request.getfixturevalue("sparse")
+    found = list(_combinations(Sampled.of(A)))
+    assert len(usual) == dependent and [k for k, _ in found] == [k for k, _ in usual]
+    for (k, few), (_, many) in zip(found, usual, strict=True):
+        assert [j for j, _ in few] == [j for j, _ in many]
+        np.testing.assert_allclose([f for _, f in few], [f for _, f in many], rtol=1e-8)
+        np.testing.assert_allclose(sum(f * A[:, j] for j, f in few), A[:, k], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_definite_matrices_are_those_without_smaller_eigenvalues(seed: int) -> None:
+    stream = np.random.default_rng(seed)
+    n = int(stream.integers(1, 25))
+    A = stream.normal(size=(n, n)) * (stream.uniform(size=(n, n)) < stream.choice([0.1, 0.3, 1.0]))
+    for M in (A @ A.T, A + A.T, A + A.T + np.diag(stream.uniform(0, 6, n))):
+        least = np.linalg.eigvalsh(M)[0]
+        assert definite(csr_matrix(M), least - 1e-6) and not definite(csr_matrix(M), least + 1e-6)
+
+
+def test_definite_matrices_have_a_diagonal() -> None:
+    """Pivots next to the diagonal, and none at all."""
+    assert not definite(csr_matrix([[0.0, 1.0], [1.0, 0.0]]), 0.0) and not definite(csr_matrix((3, 3)), 0.0)
+
+
+def test_mass_is_looked_for_where_constraints_leave_motion() -> None:
+    """Two speeds without mass: a constraint holds one of them, or both, or their sum, or none."""
+    M = csr_matrix(np.diag([2.0, 0.0, 0.0]))
+    for rows, wanted in (([[0, 1, 0]], False), ([[0, 1, 0], [0, 1, 3]], True), ([[0, 1, 1]], False), ([[1, 0, 0]], False)):
+        assert definite_along(M, csr_matrix(np.array(rows, dtype=float)), 1e-9) is wanted
+    assert definite_along(csr_matrix(np.eye(3)), csr_matrix((0, 3)), 1e-9) and not definite_along(M, csr_matrix((0, 3)), 1e-9)
+    assert not definite_along(M, csr_matrix((2, 3)), 1e-9)

@@ -7,12 +7,13 @@ Source: Benzi, Golub and Liesen, Numerical solution of saddle point problems, Ac
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import congruence, inner, vector, zeros
 from symdyn.tape.node import Node, is_zero
@@ -164,64 +165,103 @@ def _blocks(A: np.ndarray) -> list[range]:
     return blocks
 
 
-def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[int, int]] | None:
+def elimination_order(A: Sampled) -> list[tuple[int, int]] | None:
     """Pivots (row, column) for a C of full rank, large at the sample and with little fill-in (Markowitz); None if there are none.
 
-    sample (m, n): C at a state, scaled; structure (m, n): where C is not zero by structure
+    A   (1, m, n): C at a state, scaled, with the entries that are not zero by structure
     """
-    A, left = sample.astype(float).copy(), structure.copy()  # left: of waiting rows and free columns
-    waiting = np.ones(len(A), dtype=bool)
-    largest = np.where(left, np.abs(A), 0.0).max(axis=1, initial=0.0)
-    in_rows, in_columns = left.sum(axis=1), left.sum(axis=0)
+    starts = np.searchsorted(A.rows, np.arange(1, A.m))
+    columns, values = np.split(A.columns, starts), np.split(A.values[0], starts)  # of waiting rows, and of free columns
+    in_columns = np.bincount(A.columns, minlength=A.n)
+    waiting = list(range(A.m))
     pivots: list[tuple[int, int]] = []
-    for _ in range(len(A)):
-        rows, columns = np.divmod(np.flatnonzero(left), A.shape[1])
-        size = np.abs(A[rows, columns])
+    while waiting:
+        counts = np.array([len(columns[i]) for i in waiting])
+        at, size = np.concatenate([columns[i] for i in waiting]), np.abs(np.concatenate([values[i] for i in waiting]))
+        rows = np.repeat(np.arange(len(waiting)), counts)
+        largest = np.zeros(len(waiting))
+        np.maximum.at(largest, rows, size)
         admitted = np.flatnonzero((size >= ADMITTED * largest[rows]) & (largest[rows] > 1e-9))
         if not len(admitted):
             return None
-        fill = (in_rows[rows[admitted]] - 1) * (in_columns[columns[admitted]] - 1)
+        fill = (counts[rows[admitted]] - 1) * (in_columns[at[admitted]] - 1)
         least = admitted[fill == fill.min()]
         index = least[np.argmax(size[least])]
-        i, j = int(rows[index]), int(columns[index])
+        i, j = waiting[rows[index]], int(at[index])
+        touched = [waiting[k] for k in rows[at == j] if waiting[k] != i]
+        waiting.remove(i)
         pivots.append((i, j))
-        waiting[i] = False
-        row, below = np.flatnonzero(left[i]), np.flatnonzero(waiting & left[:, j])
-        left[i] = left[:, j] = False
-        row = row[row != j]
-        others = np.ix_(below, row)
-        A[others] -= np.outer(A[below, j] / A[i, j], A[i, row])
-        in_columns[row] += (~left[others]).sum(axis=0) - 1
-        in_rows[below] += (~left[others]).sum(axis=1) - 1
-        left[others] = True
-        largest[below] = np.where(left[below], np.abs(A[below]), 0.0).max(axis=1, initial=0.0)
+        kept = columns[i] != j
+        pivot, row, others = values[i][~kept][0], columns[i][kept], values[i][kept]
+        in_columns[columns[i]] -= 1
+        for below in touched:
+            there = columns[below] != j
+            factor = values[below][~there][0] / pivot
+            merged = np.union1d(columns[below][there], row)
+            changed = np.zeros(len(merged))
+            changed[np.searchsorted(merged, columns[below][there])] = values[below][there]
+            changed[np.searchsorted(merged, row)] -= factor * others
+            in_columns[columns[below]] -= 1
+            in_columns[merged] += 1
+            columns[below], values[below] = merged, changed
     return pivots
 
 
-def least_operations(structure: np.ndarray, mass: np.ndarray, pivots: Sequence[tuple[int, int]]) -> int:
+def _bits(bits: int) -> Iterator[int]:
+    """Members of a set."""
+    while bits:
+        yield (bits & -bits).bit_length() - 1
+        bits &= bits - 1
+
+
+def _turned(rows: Sequence[int], n: int) -> list[int]:
+    """Of a matrix with n columns, rows as sets of columns, the columns as sets of rows."""
+    columns = [0] * n
+    for k, row in enumerate(rows):
+        for column in _bits(row):
+            columns[column] |= 1 << k
+    return columns
+
+
+def least_operations(structure: Sampled, mass: Sampled, pivots: Sequence[tuple[int, int]]) -> int:
     """No more operations than elimination with these pivots takes: those of Z^T M Z, without what ones in Z save, and of its
     factors.
 
-    structure (m, n), mass (n, n): where C and M are not zero by structure
+    structure (m, n), mass (n, n): C and M with the entries that are not zero by structure. Rows are sets of columns, as bits.
     """
-    rows, dependent = [r for r, _ in pivots], [c for _, c in pivots]
-    free = [k for k in range(structure.shape[1]) if k not in set(dependent)]
-    left, right = structure[np.ix_(rows, dependent)].copy(), structure[np.ix_(rows, free)].copy()
-    for k in range(len(rows)):
-        below = k + 1 + np.flatnonzero(left[k + 1:, k])
-        left[below] |= left[k]
-        right[below] |= right[k]
-    for k in range(len(rows) - 1, -1, -1):
-        right[np.flatnonzero(left[:k, k])] |= right[k]
-    Z = np.zeros((structure.shape[1], len(free)), dtype=np.float32)
-    Z[free, range(len(free))] = 1
-    Z[dependent] = right
-    MZ = (mass.astype(np.float32) @ Z > 0).astype(np.float32)
-    near = Z.T @ MZ > 0
-    products = np.tril(Z[dependent].T @ MZ[dependent])
-    operations = int(np.maximum(2 * products - 1, 0).sum())
+    dependent = {column: k for k, (_, column) in enumerate(pivots)}
+    number = {row: k for k, (row, _) in enumerate(pivots)}
+    free = {column: k for k, column in enumerate(k for k in range(structure.n) if k not in dependent)}
+    left, right = [0] * len(pivots), [0] * len(pivots)
+    for i, j in zip(structure.rows.tolist(), structure.columns.tolist(), strict=True):
+        if j in dependent:
+            left[number[i]] |= 1 << dependent[j]
+        else:
+            right[number[i]] |= 1 << free[j]
+    for k in range(len(left)):
+        for below in range(k + 1, len(left)):
+            if left[below] >> k & 1:
+                left[below] |= left[k]
+                right[below] |= right[k]
+    for k in range(len(left) - 1, -1, -1):
+        for above in range(k):
+            if left[above] >> k & 1:
+                right[above] |= right[k]
+    Z = [right[dependent[k]] if k in dependent else 1 << free[k] for k in range(structure.n)]
+    MZ = [0] * structure.n
+    for i, j in zip(mass.rows.tolist(), mass.columns.tolist(), strict=True):
+        MZ[i] |= Z[j]
+    by_Z, by_MZ = _turned(right, len(free)), _turned([MZ[column] for _, column in pivots], len(free))
+    near, operations = [0] * len(free), 0
+    for k, row in enumerate(Z):
+        for a in _bits(row):
+            near[a] |= MZ[k]
+    for a, ones in enumerate(by_Z):
+        for b in range(a + 1):
+            operations += max(2 * (ones & by_MZ[b]).bit_count() - 1, 0)
     for k in range(len(free) - 1, -1, -1):  # as the factors are made, from the last to the first
-        others = np.flatnonzero(near[k, :k])
-        near[np.ix_(others, others)] = True
-        operations += len(others) * (len(others) + 1) // 2
+        others = near[k] & ((1 << k) - 1)
+        for a in _bits(others):
+            near[a] |= others
+        operations += others.bit_count() * (others.bit_count() + 1) // 2
     return operations

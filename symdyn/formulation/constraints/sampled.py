@@ -94,6 +94,12 @@ class Sampled:
         """The rows where this (m,) holds are zero."""
         return replace(self, values=np.where(left_out[self.rows], 0.0, self.values))
 
+    def together(self) -> Sampled:
+        """The matrices of all states next to each other, as one state, (m, s n)."""
+        rows, columns = np.tile(self.rows, len(self)), (self.n * np.arange(len(self))[:, None] + self.columns).ravel()
+        order = np.argsort(rows, kind="stable")
+        return Sampled(self.m, len(self) * self.n, rows[order], columns[order], self.values.ravel()[None, order])
+
     def times(self, v: np.ndarray) -> np.ndarray:
         """A v (s, m) for v (s, n)."""
         if not self.sparse:

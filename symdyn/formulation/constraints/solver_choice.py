@@ -16,7 +16,7 @@ from symdyn.formulation.constraints.null_space import elimination_order, least_o
 from symdyn.formulation.constraints.saddle import no_room
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
-from symdyn.formulation.probes.definite import smallest_eigenvalue
+from symdyn.formulation.probes.definite import definite_along
 from symdyn.formulation.probes.dependent_rows import Ranks
 from symdyn.formulation.probes.rank import first_dependent
 from symdyn.spatial.vectors import vector
@@ -35,6 +35,8 @@ MARGIN = 2
 # Where a way fails at more of the states tried, it is counted with what the numeric algorithm takes there; walks come to folded
 # positions, where ways fail, more often than motions do.
 RARELY = 0.1
+# Numbers that are kept at once where a way is tried at many states.
+AT_ONCE = 5_000_000
 
 
 def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
@@ -60,7 +62,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     if not singular(quantities):
         ways["Schur complement of the mass matrix"] = derivation(False, independent, None)
     counts = {name: operations(way) for name, way in ways.items()}
-    pivots, least = _pivots(quantities, found, min(counts.values(), default=None))
+    pivots, least = _pivots(found, min(counts.values(), default=None))
     others: list[str] = []
     if least:
         others.append(f"elimination of dependent speeds, {least} at least")
@@ -146,8 +148,13 @@ def _failing(way: Constrained, found: Ranks | None) -> float:
     margins = [node.args[1] if node.op == "guard" else node for node in steps if node in checked]
     if not margins:
         return 0.0
-    sizes = evaluate_rows(Tape.of(recorder, margins=vector(*margins)), found.values, len(found.samples))["margins"]
-    return float((~(sizes > 0).all(axis=1)).mean())
+    tape, failing = Tape.of(recorder, margins=vector(*margins)), 0
+    at_once = max(1, AT_ONCE // len(tape.steps))
+    for first in range(0, len(found.samples), at_once):
+        part = slice(first, min(first + at_once, len(found.samples)))
+        values = {name: value[part] if np.ndim(value) else value for name, value in found.values.items()}
+        failing += int((~(evaluate_rows(tape, values, part.stop - first)["margins"] > 0).all(axis=1)).sum())
+    return failing / len(found.samples)
 
 
 def _fails(part: float) -> str:
@@ -161,24 +168,20 @@ def singular(quantities: Constrained) -> bool:
     return any(is_zero(M[k, k]) for k in range(len(M))) or first_dependent(quantities.algebra.recorder, M) is not None
 
 
-def _pivots(quantities: Constrained, result: Ranks | None, fewest: int | None) -> tuple[Pivots | None, int]:
+def _pivots(result: Ranks | None, fewest: int | None) -> tuple[Pivots | None, int]:
     """Dependent speeds and their order, where the sample state allows it; none, and how many operations it takes at least,
     where these are many more than the fewest of other ways."""
     if result is None or not result.independent:
         return None, 0
     kept = list(result.independent)
-    C_r = quantities.C_r()[kept]
-    structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
     if not _holds(result, kept):
         return None, 0
     samples = result.samples.of_rows(kept)
-    orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)].dense()
-              if (order := elimination_order(A, structure)) is not None}
+    orders = {tuple(order) for k in range(0, len(samples), max(1, len(samples) // CANDIDATES))
+              if (order := elimination_order(samples[[k]])) is not None}
     if not orders:
         return None, 0
-    M = quantities.recall("M_tilde")
-    mass = np.array([[not is_zero(e) for e in row] for row in M], dtype=bool).reshape(M.shape)
-    least = min(least_operations(structure, mass, order) for order in sorted(orders))
+    least = min(least_operations(samples, result.mass, order) for order in sorted(orders))
     if fewest is not None and least > MARGIN * fewest:
         return None, least
     whole = samples.smallest()
@@ -194,8 +197,9 @@ def _pivots(quantities: Constrained, result: Ranks | None, fewest: int | None) -
 
 def _holds(result: Ranks, kept: list[int]) -> bool:
     """Whether there is mass in every direction that the constraints leave; there is where every direction has mass."""
-    least = MASSLESS * max(np.abs(result.mass).max(), 1e-300)
-    if smallest_eigenvalue(result.mass) > least:
+    M, C_r = result.mass.matrices[0], result.samples[[0]].of_rows(kept)
+    least = MASSLESS * max(abs(M).max(), 1e-300)
+    if definite_along(M, C_r.matrices[0], least):
         return True
-    free = np.linalg.svd(result.samples[[0]].of_rows(kept).dense()[0])[2][len(kept):].T
-    return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ result.mass @ free)[0] > least)
+    free = np.linalg.svd(C_r.dense()[0])[2][len(kept):].T
+    return not free.shape[1] or bool(np.linalg.eigvalsh(free.T @ (M @ free))[0] > least)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +12,8 @@ import numpy as np
 from symdyn.errors import ModelWarning
 from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.probes.definite import smallest_eigenvalue
-from symdyn.tape.floats import evaluate_rows
+from symdyn.formulation.probes.definite import definite_along
+from symdyn.tape.floats import evaluate_entries
 
 STATES = 12
 # Sets of numbers for parameters that a contradiction must outlast.
@@ -21,6 +21,8 @@ TRIALS = 16
 TOLERANCE = 1e-9
 # The square of the smallest singular value of unit rows from which on none of them depends on the others.
 INDEPENDENT = 1e-9
+# Entries of orthonormal combinations of unit rows that are more than rounding.
+TAKES_PART = 1e-6
 # Part of the largest inertia up to which there is nothing but rounding.
 NO_MASS = 1e-13
 
@@ -30,9 +32,9 @@ class _Draw:
     """At random states: C (s, n_c), C_r (s, n_c, n_u), C_t (s, n_c), M (s, n_u, n_u)."""
 
     C: np.ndarray
-    C_r: np.ndarray
+    C_r: Sampled
     C_t: np.ndarray
-    M: np.ndarray
+    M: Sampled
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ def contradictions(equations: Equations) -> list[str]:
         return []
     names = equations.constraints
     faults = []
-    empty = [k for k in range(len(names)) if all(np.abs(d.C_r[:, k]).max() <= TOLERANCE for d in draws)]
+    sizes = np.max([d.C_r.largest_of_rows().max(axis=0) for d in draws], axis=0)
+    empty = [k for k in range(len(names)) if sizes[k] <= TOLERANCE]
     faults += [f"{names[k]} holds nothing: its derivatives by all coordinates and speeds vanish at every state; remove it, or "
                "correct it" for k in empty]
     kept = [k for k in range(len(names)) if k not in empty]
@@ -103,36 +106,21 @@ def _draw(equations: Equations, numbers: Mapping[str, float]) -> _Draw | None:
     for group in (symbols.coordinates, symbols.speeds, symbols.states):
         values |= {s.name: stream.uniform(0.5, 1.5, STATES) for s in group}
     values |= {s.name: stream.uniform(0.5, 1.5) for s in symbols.inputs}  # motions are given, as time is
-    result = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
-    arrays = [result[name] for name in ("C", "C_r", "C_t", "M_tilde")]
-    defined = np.all([np.isfinite(a.reshape(STATES, -1)).all(axis=1) for a in arrays], axis=0)
-    return _Draw(*[a[defined] for a in arrays]) if defined.sum() > STATES // 2 else None
+    result = evaluate_entries(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
+    defined = np.all([np.isfinite(entries.values).all(axis=1) for entries in result.values()], axis=0)
+    if defined.sum() <= STATES // 2:
+        return None
+    C, C_t = (result[name].dense()[defined] for name in ("C", "C_t"))
+    C_r, M = (Sampled.of_entries(result[name])[defined] for name in ("C_r", "M_tilde"))
+    return _Draw(C, C_r, C_t, M)
 
 
 def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> list[_Conflict]:
     """Rows that are the same combination of others at all states, but for a constant that is not zero."""
     order = sorted(kept, key=lambda k: not holonomic[k])
-    if order and _independent(draw.C_r[:, order]):
-        return []
-    gradients = {k: draw.C_r[:, k].ravel() for k in order}
-    if order:
-        directions = np.array([g / np.linalg.norm(g) for g in gradients.values()])
-        if np.linalg.eigvalsh(directions @ directions.T)[0] > INDEPENDENT:  # no row depends on the others
-            return []
-    independent: list[int] = []
     result = []
-    for k in order:
-        gradient = gradients[k]
-        if not independent:
-            independent.append(k)
-            continue
-        A = np.array([gradients[j] / np.linalg.norm(gradients[j]) for j in independent]).T
-        factors = np.linalg.lstsq(A, gradient, rcond=1e-12)[0]
-        if np.linalg.norm(A @ factors - gradient) > TOLERANCE * np.linalg.norm(gradient):
-            independent.append(k)
-            continue
-        used = [(j, f / np.linalg.norm(gradients[j])) for j, f in zip(independent, factors, strict=True)
-                if abs(f) > TOLERANCE * np.linalg.norm(gradient)]
+    for k, used in _combinations(draw.C_r.of_rows(order)):
+        k, used = order[k], [(order[j], f) for j, f in used]
         others = tuple(j for j, _ in used)
         tests = [(draw.C_t, "speeds")]
         if all(holonomic[j] for j in (k, *others)):
@@ -146,13 +134,63 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
     return result
 
 
-def _independent(C_r: np.ndarray) -> bool:
-    """Whether many rows (s, m, n) with few entries are found independent by sparse factors at the first state."""
-    first = Sampled.of(C_r[:1])
-    if not first.sparse:
-        return False
-    sizes = np.sqrt((C_r * C_r).sum(axis=(0, 2)))[None]  # as parts of the rows at all states
-    return bool(first.scaled(1 / sizes, np.ones((1, first.n))).smallest()[0]**2 > INDEPENDENT)
+def _combinations(A: Sampled) -> Iterator[tuple[int, list[tuple[int, float]]]]:
+    """Rows that are the same combination at all states of rows before them that are none, each with these and their factors."""
+    if not A.m:
+        return
+    if A.sparse:
+        whole = A.together()
+        gradients = whole.matrices[0]
+        for k, near in _dependent(whole):
+            some = gradients[[k, *near]]
+            gradient, *others = some[:, np.unique(some.indices)].toarray()
+            if (factors := _factors(gradient, others)) is not None:
+                yield k, [(near[j], f) for j, f in factors]
+        return
+    flat = A.dense().transpose(1, 0, 2).reshape(A.m, -1)
+    directions = flat / np.linalg.norm(flat, axis=1)[:, None]
+    if np.linalg.eigvalsh(directions @ directions.T)[0] > INDEPENDENT:  # no row depends on the others
+        return
+    independent = [0]
+    for k in range(1, A.m):
+        found = _factors(flat[k], [flat[j] for j in independent])
+        if found is None:
+            independent.append(k)
+        else:
+            yield k, [(independent[j], f) for j, f in found]
+
+
+def _factors(gradient: np.ndarray, others: Sequence[np.ndarray]) -> list[tuple[int, float]] | None:
+    """Of the others those that the gradient is a combination of, with their factors; None if it is none."""
+    A = np.array([g / np.linalg.norm(g) for g in others]).T
+    factors = np.linalg.lstsq(A, gradient, rcond=1e-12)[0]
+    if np.linalg.norm(A @ factors - gradient) > TOLERANCE * np.linalg.norm(gradient):
+        return None
+    return [(j, f / np.linalg.norm(others[j])) for j, f in enumerate(factors) if abs(f) > TOLERANCE * np.linalg.norm(gradient)]
+
+
+def _dependent(A: Sampled) -> list[tuple[int, list[int]]]:
+    """By sparse factors, rows of a matrix (1, m, n) that depend on the rows before them, each with those of these that take part
+    and depend on none: the combinations that vanish, brought from the last row on to an echelon form."""
+    sizes = np.sqrt(np.bincount(A.rows, weights=A.values[0]**2, minlength=A.m))
+    factors = A.scaled(1 / sizes[None], np.ones((1, A.n))).triangular()
+    count = int((~factors.kept).sum())
+    if not count:
+        return []
+    left = np.linalg.qr(factors.combinations(count)[0])[0]
+    pivots: dict[int, int] = {}  # rows by combination
+    for k in range(A.m - 1, -1, -1):
+        free = [c for c in range(count) if c not in pivots]
+        if not free:
+            break
+        c = max(free, key=lambda c: abs(left[k, c]))
+        if abs(left[k, c]) > TAKES_PART:
+            pivots[c] = k
+            left[:, c] /= left[k, c]
+            others = [d for d in range(count) if d != c]
+            left[:, others] -= np.outer(left[:, c], left[k, others])
+    return [(k, [int(j) for j in np.flatnonzero(np.abs(left[:, c]) > TAKES_PART) if j != k])
+            for c, k in sorted(pivots.items(), key=lambda item: item[1])]
 
 
 def _alike(a: _Conflict, b: _Conflict) -> bool:
@@ -194,20 +232,22 @@ def _same(a: _Conflict, b: _Conflict) -> bool:
 def _loose(draw: _Draw) -> set[int] | None:
     """Speeds that take part in a motion without mass that the constraints leave at every state; None if there is none."""
     common: set[int] | None = None
-    for M, C_r in zip(draw.M, draw.C_r, strict=True):
+    diagonal = np.zeros((len(draw.M), draw.M.n))
+    on = draw.M.rows == draw.M.columns
+    diagonal[:, draw.M.rows[on]] = np.abs(draw.M.values[:, on])
+    for k, inertia in enumerate(diagonal):
         # A lamp on a ship is no motion without mass: speeds count in units in which their inertia is 1.
-        inertia = np.abs(np.diag(M))
         largest = max(inertia.max(), 1e-300)
-        unit = np.sqrt(np.where(inertia > NO_MASS * largest, inertia, largest))
-        M = M / np.outer(unit, unit)
-        if smallest_eigenvalue(M) > TOLERANCE:  # every motion has mass
+        unit = np.sqrt(np.where(inertia > NO_MASS * largest, inertia, largest))[None]
+        M, C_r = draw.M[[k]].scaled(1 / unit, unit), draw.C_r[[k]].scaled(np.ones((1, draw.C_r.m)), unit)
+        if definite_along(M.matrices[0], C_r.matrices[0], TOLERANCE):  # every motion that is left has mass
             return None
-        Vt = np.linalg.svd(C_r / unit)[2]
-        sizes = np.linalg.svd(C_r / unit, compute_uv=False)
+        Vt = np.linalg.svd(C_r.dense()[0])[2]
+        sizes = C_r.singular_values()[0]
         free = Vt[int((sizes > TOLERANCE * sizes.max(initial=0.0)).sum()):].T
         if not free.shape[1]:
             return None
-        values, vectors = np.linalg.eigh(free.T @ M @ free)
+        values, vectors = np.linalg.eigh(free.T @ (M.matrices[0] @ free))
         null = np.abs(values) <= NO_MASS
         if not null.any():
             return None

@@ -33,7 +33,7 @@ VANISHING = 1e-5
 class Ranks:
     """rank: the largest found, of the scaled C_r; independent: rows that have it, far from losing it at all states.
 
-    samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
+    samples   (s, n_c, n_u) scaled C_r at the states; mass (1, n_u, n_u): M_tilde at the first of them
     vanishing   rows whose derivatives vanish at all these states, but not next to them
     values    name -> number, or (s,) at these states
     """
@@ -41,7 +41,7 @@ class Ranks:
     rank: int
     independent: tuple[int, ...]
     samples: Sampled
-    mass: np.ndarray
+    mass: Sampled
     vanishing: tuple[int, ...] = ()
     values: Mapping[str, Any] = field(default_factory=dict)
 
@@ -97,12 +97,12 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
                  values)
 
 
-def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
+def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> Sampled | None:
     """M_tilde at the first of the places (s, n_q) where it exists: not at gimbal lock where a joint follows angles."""
     values = {**states.values, **dict(zip(states.names, places.T, strict=True))}
     masses = Sampled.of_entries(evaluate_entries(equations.tape("M_tilde"), values, len(places))["M_tilde"])
     there = np.isfinite(masses.values).all(axis=1)
-    return masses[[int(np.argmax(there))]].dense()[0] if there.any() else None
+    return masses[[int(np.argmax(there))]] if there.any() else None
 
 
 def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
