@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from docutils import nodes
+from printed import as_table
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
@@ -52,9 +53,6 @@ COMMANDS = {
     "site": "python tests/checks/whole_site.py generated/site",
     "walk": "python tests/checks/walk.py generated/site",
 }
-# A line with a figure, as the lab prints it: its name, the number, the unit, the bound, whether that is missed.
-FIGURE = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<value>-?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan))"
-                    r"(?: (?P<unit>[^\s<>]+))?\s*(?P<bound>(?:<=?|>=) \S+)?\s*(?P<missed>MISSED)?")
 # Columns from which on a table has small letters, and letters of a cell that gets some width there.
 WIDE, LONG = 8, 40
 
@@ -97,19 +95,7 @@ def machine() -> str:
 
 def rows_of(result: dict[str, Any]) -> tuple[list[str], list[list[str]], list[str]]:
     """The head and the rows of a table, and the lines below it; no rows of what is no table."""
-    if "rows" in result:
-        return result["head"], result["rows"], []
-    lines = result["lines"]
-    found = [FIGURE.fullmatch(line) for line in lines]
-    if all(found):
-        return ["", "measured", "bound"], [[one["name"], f"{one['value']} {one['unit'] or ''}".strip(), " ".join(
-            filter(None, (one["bound"], one["missed"] and "(missed)")))] for one in found if one], []
-    # Columns that are two or more spaces apart, without an empty cell; the last one may have two.
-    head, *cells = [re.split(r"\s{2,}", line.strip()) for line in lines]
-    count = next((k for k, row in enumerate(cells) if len(row) - len(head) not in (0, 1)), len(cells))
-    if len(head) < 3 or not count:
-        return [], [], lines
-    return head, [[*row[:len(head) - 1], ": ".join(row[len(head) - 1:])] for row in cells[:count]], lines[1 + count:]
+    return (result["head"], result["rows"], []) if "rows" in result else as_table(result["lines"])
 
 
 class Measured(SphinxDirective):

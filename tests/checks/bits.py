@@ -99,24 +99,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     sys.path.insert(0, str(ROOT))
     from symdyn import systems
+    from tests.checks.commits import tree_of
 
     differing = 0
-    with tempfile.TemporaryDirectory() as made:
-        other = Path(made, "tree")
-        subprocess.run(["git", "worktree", "add", "--quiet", "--detach", str(other), options.against], cwd=ROOT, check=True)
-        try:
-            print(f"{'':36}" + "".join(f"{method:>10}" for method in options.methods), flush=True)
-            for name in options.names or systems.names():
-                now, then = (measured(root, name, options.methods) for root in (ROOT, other))
-                found = {method: difference(now[method], then[method]) for method in options.methods}
-                other_bits = {method: text for method, text in found.items() if text not in ("=", "-")}
-                differing += len(other_bits)
-                print(f"{name:36}" + "".join(f"{text if method not in other_bits else 'differs':>10}"
-                                             for method, text in found.items()))
-                for method, text in other_bits.items():
-                    print(f"    {method}: {text}", flush=True)
-        finally:
-            subprocess.run(["git", "worktree", "remove", "--force", str(other)], cwd=ROOT, check=True)
+    with tree_of(options.against) as other:
+        print(f"{'':36}" + "".join(f"{method:>10}" for method in options.methods), flush=True)
+        for name in options.names or systems.names():
+            now, then = (measured(root, name, options.methods) for root in (ROOT, other))
+            found = {method: difference(now[method], then[method]) for method in options.methods}
+            other_bits = {method: text for method, text in found.items() if text not in ("=", "-")}
+            differing += len(other_bits)
+            print(f"{name:36}" + "".join(f"{text if method not in other_bits else 'differs':>10}"
+                                         for method, text in found.items()))
+            for method, text in other_bits.items():
+                print(f"    {method}: {text}", flush=True)
     print(f"{differing} differ" if differing else "the same bits")
     return int(differing > 0)
 
