@@ -21,8 +21,6 @@ OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
 OF_CARRYING = ("carried_columns",)
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
-# Events that wait until they are taken are rows of which, time, state before, state after.
-_NOTE = 2
 # No step begins while so many wait; each step may add some, see `most_events`.
 WAITING = 64
 
@@ -145,8 +143,7 @@ def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, i
     if shape.unit_groups:
         result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
     if shape.events:
-        result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_NOTE", _NOTE + 2 * shape.n_x),
-                   ("SYMDYN_WAITING", WAITING), ("SYMDYN_NOTES", shape.most_events)]
+        result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_WAITING", WAITING), ("SYMDYN_NOTES", shape.most_events)]
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))

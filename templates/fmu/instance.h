@@ -39,7 +39,8 @@ typedef struct fmu_instance {
     double rates[FMU_N_X], outputs[FMU_N_OUTPUTS + 1];
     double by_x[FMU_ROWS * FMU_N_X], by_inputs[FMU_ROWS * FMU_N_INPUTS + 1], by_p[FMU_ROWS * FMU_N_P + 1];
 #if FMU_N_EVENTS
-    double notes[FMU_FUNCTION(most_events) * (2 + 2 * FMU_N_X)];
+    symdyn_noted noted[FMU_FUNCTION(most_events)];
+    double noted_states[FMU_FUNCTION(most_events) * 2 * FMU_N_X];
 #endif
     symdyn_problem problem;
     int may_return_early;
@@ -332,9 +333,9 @@ static int fmu_step(fmu_instance *f, double step, double *reached) {
         double at = wanted;
         const int status = FMU_FUNCTION(simulation_go)(f->run, 0, attempts, &at, 1, s->x, &written);
 #if FMU_N_EVENTS
-        const long n = FMU_FUNCTION(simulation_events)(f->run, f->notes);
+        const long n = FMU_FUNCTION(simulation_events)(f->run, f->noted, f->noted_states);
         for (long k = 0; k < n; k++)
-            if (f->notes[k * (2 + 2 * FMU_N_X)] < 0.0) fmu_log(f, 0, "an event varies so quickly that zeros of it may be missed");
+            if (f->noted[k].kind != SYMDYN_HAPPENED) fmu_log(f, 0, "an event varies so quickly that zeros of it may be missed");
 #endif
         if (written) break;
         symdyn_report report;

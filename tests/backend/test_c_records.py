@@ -14,11 +14,12 @@ from symdyn.runtime.batches.states import Table
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.hybrid import PhaseCode, Record
-from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.run_record import STATUS, Noted, RunReport
+from tests.backend.c_warnings import RUNTIME
 
 RECORDS = {"runtime/report_type.h": (RunReport, "symdyn_report"), "runtime/problem_type.h": (Problem, "symdyn_problem"),
            "runtime/table_type.h": (Table, "symdyn_table"), "runtime/hybrid_type.h": (Record, "symdyn_hybrid"),
-           "runtime/phase_code_type.h": (PhaseCode, "symdyn_phase_code")}
+           "runtime/phase_code_type.h": (PhaseCode, "symdyn_phase_code"), "runtime/noted_type.h": (Noted, "symdyn_noted")}
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -32,7 +33,8 @@ def test_mirrors_have_the_offsets_that_c_gives(file: str, tmp_path: Path) -> Non
     path.write_text(f"#include <stddef.h>\n{text}\nlong offsets(int k) {{\nconst long all[] = {{{offsets}, sizeof({name})}};\n"
                     "return all[k];\n}\n")
     made = tmp_path / "offsets.so"
-    subprocess.run([*require_compiler().command, "-shared", "-fPIC", "-o", str(made), str(path)], check=True, timeout=60)
+    command = [*require_compiler().command, "-shared", "-fPIC", f"-I{RUNTIME}", "-o", str(made), str(path)]
+    subprocess.run(command, check=True, timeout=60)
     library = ctypes.CDLL(str(made))
     library.offsets.restype = ctypes.c_long
     for k, field in enumerate(names):

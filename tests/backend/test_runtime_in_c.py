@@ -26,7 +26,7 @@ from symdyn.backend.packed import Pattern
 from symdyn.backend.source import _shipped, template_folders
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
-from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.run_record import NOTED, STATUS, Noted, RunReport
 from tests.backend.c_warnings import RUNTIME, faults_of
 
 STRICT = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable",
@@ -95,9 +95,12 @@ class Run:
 
     def events(self, n_events: int) -> np.ndarray:
         """Rows of which, time, state before, state after."""
-        rows = np.zeros((integrated.most_events(n_events), 2 + 2 * self.n))
+        noted = np.zeros(integrated.most_events(n_events), dtype=np.dtype(Noted))
+        states = np.zeros((len(noted), 2 * self.n))
         self.library.symdyn_simulation_events.restype = ctypes.c_long
-        return rows[:self.library.symdyn_simulation_events(self.address, pointer(rows))]
+        n = self.library.symdyn_simulation_events(self.address, pointer(noted), pointer(states))
+        assert (noted["kind"][:n] == NOTED.HAPPENED).all()
+        return np.column_stack([noted["event"][:n], noted["t"][:n], states[:n]])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """States at the times, after which the run is over."""

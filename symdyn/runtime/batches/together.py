@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.backend.c_records import codes_of
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.batches.sensitivities import Columns, doubtful, held, without_effect
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
@@ -18,7 +17,7 @@ from symdyn.runtime.batches.starts import consistent_starts, projects
 from symdyn.runtime.integrating.chatter import STEPS
 from symdyn.runtime.integrating.compiled import FAR, PIECE, moved_far
 from symdyn.runtime.integrating.events import not_seen
-from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.run_record import NOTED, STATUS, RunReport
 from symdyn.runtime.integrating.sensitivities import zeros
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.masses import negative_masses
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 LISTED = 3
-UNRESOLVED, UNPROVED = (codes_of("runtime/dropped_events.h")[what] for what in ("UNRESOLVED", "UNPROVED"))
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ class Together:
         if without_series.any() and not interrupted:
             note = f"{without_series.sum()} of {n} motions one by one: there is no Taylor series of some of their states"
         late |= without_series
-        doubtful = self.doubts & (UNRESOLVED if self.asked.event_spacing else UNRESOLVED | UNPROVED) != 0
+        doubtful = self.doubts & (NOTED.UNRESOLVED if self.asked.event_spacing else NOTED.UNRESOLVED | NOTED.UNPROVED) != 0
         if doubtful.any() and not interrupted:
             note = f"{doubtful.sum()} of {n} motions one by one: quantities of their events vary too quickly to be resolved"
         late |= doubtful

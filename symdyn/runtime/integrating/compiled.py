@@ -22,7 +22,7 @@ from symdyn.runtime.integrating.events import Happened, at_once, ended, entangle
 from symdyn.runtime.integrating.interrupts import Interrupts
 from symdyn.runtime.integrating.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.integrating.outcome import Outcome, Request
-from symdyn.runtime.integrating.run_record import STATUS, Report, RunReport
+from symdyn.runtime.integrating.run_record import NOTED, STATUS, Noted, Report, RunReport
 from symdyn.runtime.integrating.short_steps import ShortSteps
 from symdyn.runtime.integrating.stabilization import Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
@@ -82,10 +82,11 @@ class Run:
         self.too_quick: list[tuple[int, float]] = []
         self.hidden: list[tuple[int, float]] = []
         self.entangled: list[tuple[int, float]] = []
-        self.rows: np.ndarray | None = None
+        self.noted: np.ndarray | None = None
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
-            self.rows = np.zeros((most_events(len(self.look)), 2 + 2 * self.n_x))
+            most = most_events(len(self.look))
+            self.noted, self.noted_states = np.zeros(most, dtype=np.dtype(Noted)), np.zeros((most, 2, self.n_x))
             library.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
                                                 ctypes.c_double(request.event_spacing))
             if request.carried is not None:
@@ -145,16 +146,16 @@ class Run:
         arguments = [ctypes.c_long(a) if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (limit, *rest)]
         with self.guard:
             status = self._timed("simulation_go", ctypes.c_int(every), *arguments, ctypes.byref(self.written))
-        if self.rows is not None:
+        if self.noted is not None:
             take = self.library.function("simulation_events")
             take.restype = ctypes.c_long
-            n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
-            for k, t, *states in self.rows[:n]:
-                if k < 0:
-                    kind, of = divmod(-1 - int(k), len(self.look))
-                    (self.too_quick, self.hidden, self.entangled)[kind].append((of, float(t)))
+            n = take(self.address, *(ctypes.c_void_p(a.ctypes.data) for a in (self.noted, self.noted_states)))
+            doubts = {NOTED.UNRESOLVED: self.too_quick, NOTED.UNPROVED: self.hidden, NOTED.ENTANGLED: self.entangled}
+            for (kind, of, t), states in zip(self.noted[:n].tolist(), self.noted_states[:n].copy(), strict=True):
+                if kind == NOTED.HAPPENED:
+                    self.happened.append(Happened(of, t, *states))
                 else:
-                    self.happened.append(Happened(int(k), float(t), *np.array(states).reshape(2, -1)))
+                    doubts[kind].append((of, t))
         return status
 
     def _timed(self, name: str, *arguments: Any) -> int:

@@ -26,6 +26,7 @@ from symdyn.runtime.integrating import slip_begins
 from symdyn.runtime.integrating.compiled import FAR, Problem
 from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.runtime.integrating.run_record import Noted
 from symdyn.runtime.integrating.stabilization import Corrections
 from symdyn.thresholds import DEPENDENT
 
@@ -164,7 +165,8 @@ class Motion:
         self.sign, self.left = take(record, "sign", np.zeros(n)), take(record, "left", np.full(n, -np.inf))
         self.slipping = take(record, "slipping", np.zeros(n, dtype=np.intc))
         put(record, np.intc, old_mode=n, old_still=n, old_passed=n, ruled_out=n, look=n_events, leaves=n)
-        put(record, float, old_sign=n, old_x=n_x, rows_of_events=most_events(n_events) * (2 + 2 * n_x),
+        put(record, np.dtype(Noted), noted=most_events(n_events))
+        put(record, float, old_sign=n, old_x=n_x, noted_states=most_events(n_events) * 2 * n_x,
             states=max(2 * n_x, n_rows), ahead=sizes.x + 2 * n)
         self.begin, self.end = (take(record, name, np.zeros(MOST_PHASES)) for name in ("phase_begin", "phase_end"))
         self.phase_p = take(record, "phase_p", np.zeros((MOST_PHASES + 1, self.n_p)))

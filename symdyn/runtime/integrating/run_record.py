@@ -11,6 +11,7 @@ import numpy as np
 from symdyn.backend.c_records import codes_of, fields_of
 
 STATUS = SimpleNamespace(**codes_of("runtime/status.h"))
+NOTED = SimpleNamespace(**codes_of("runtime/noted_type.h"))
 
 
 class RunReport(ctypes.Structure):
@@ -41,6 +42,12 @@ class RunReport(ctypes.Structure):
     n_divided: int
     n_rough: int
     t_rough: float
+
+
+class Noted(ctypes.Structure):
+    """An event, or a doubt about events; see c/runtime/noted_type.h."""
+
+    _fields_ = fields_of("runtime/noted_type.h")
 
 
 class SingleReport(ctypes.Structure):

@@ -251,15 +251,14 @@ static int symdyn_event_unproved(
 }
 #endif
 
-// Note event k, or, as -1 - k, that its zeros were not resolved, as -1 - SYMDYN_N_EVENTS - k, that it was not proved that they
-// are, as -1 - 2 SYMDYN_N_EVENTS - k, that the columns depend on the order of events at one time.
-static void symdyn_event_note(symdyn_run *run, int k, double t, const double *before, const double *after) {
-    double *const note = run->events.noted + SYMDYN_NOTE * run->events.n_noted++;
-    note[0] = k;
-    note[1] = t;
+// Note event k, or a doubt about it.
+static void symdyn_event_note(symdyn_run *run, int kind, int k, double t, const double *before, const double *after) {
+    double *const states = run->events.noted_states + 2 * SYMDYN_NX * run->events.n_noted;
+    const symdyn_noted note = {kind, k, t};
+    run->events.noted[run->events.n_noted++] = note;
     for (int i = 0; i < SYMDYN_NX; i++) {
-        note[2 + i] = before[i];
-        note[(2 + SYMDYN_NX) + i] = after[i];
+        states[i] = before[i];
+        states[SYMDYN_NX + i] = after[i];
     }
 }
 
@@ -566,7 +565,7 @@ static int symdyn_event_columns(symdyn_run *run, double t, const double *x, doub
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.fired[k] = all[k];
     if (!ordered && !run->events.entangled && !failure) {
         run->events.entangled = 1;
-        symdyn_event_note(run, -1 - 2 * SYMDYN_N_EVENTS - events[0], t, x, x);
+        symdyn_event_note(run, SYMDYN_ENTANGLED, events[0], t, x, x);
     }
     return failure;
 }
@@ -709,7 +708,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         }
         if (wavy >= 0 && !run->events.unresolved[wavy]) {
             run->events.unresolved[wavy] = run->events.coarse = 1;
-            symdyn_event_note(run, -1 - wavy, left, run->x_old, run->x_old);
+            symdyn_event_note(run, SYMDYN_UNRESOLVED, wavy, left, run->x_old, run->x_old);
         }
 #if SYMDYN_HAS_BOUNDS
         const int hidden = divisible && wavy < 0 ? symdyn_event_unproved(run, left, right, v, states) : -1;
@@ -720,7 +719,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         }
         if (hidden >= 0 && !run->events.unproved[hidden]) {
             run->events.unproved[hidden] = 1;
-            symdyn_event_note(run, -1 - SYMDYN_N_EVENTS - hidden, left, run->x_old, run->x_old);
+            symdyn_event_note(run, SYMDYN_UNPROVED, hidden, left, run->x_old, run->x_old);
         }
 #endif
         const double *const values = v[SYMDYN_PANEL - 1];
@@ -772,7 +771,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         resets |= jumps;
 #endif
         for (int k = 0; k < SYMDYN_N_EVENTS; k++)
-            if (run->events.fired[k]) symdyn_event_note(run, k, first, x, run->events.after);
+            if (run->events.fired[k]) symdyn_event_note(run, SYMDYN_HAPPENED, k, first, x, run->events.after);
         left = first;
         if (failure) break;
         if (resets) {
@@ -878,13 +877,13 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, 
     return symdyn_event_reset(run, run->t, run->x, after);
 }
 
-// Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
-// too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
-// on, -1 - 2 SYMDYN_N_EVENTS - k for one of several at one time on whose order the columns depend. Returns how many.
-SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows) {
+// Take the events so far, and doubts about them, at most SYMDYN_NOTES; states (2 SYMDYN_NX each): before and after them. Returns
+// how many.
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, symdyn_noted *noted, double *states) {
     symdyn_run *const run = (symdyn_run *)memory;
     const int n = run->events.n_noted;
-    for (int k = 0; k < n * SYMDYN_NOTE; k++) rows[k] = run->events.noted[k];
+    for (int k = 0; k < n; k++) noted[k] = run->events.noted[k];
+    for (int k = 0; k < n * 2 * SYMDYN_NX; k++) states[k] = run->events.noted_states[k];
     run->events.n_noted = 0;
     if (run->status == SYMDYN_STORE_FULL) run->status = SYMDYN_STEP_LIMIT;
     return n;

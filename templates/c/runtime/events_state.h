@@ -1,6 +1,8 @@
 // Memory of the search for events in a run.
 #pragma once
 
+#include "noted_type.h"
+
 #if SYMDYN_NOTES < SYMDYN_WAITING + 3 * SYMDYN_N_EVENTS
 #error "noted has no room for the events of a step that begins with SYMDYN_WAITING - 1 of them"
 #endif
@@ -36,5 +38,6 @@ typedef struct {
     int off_constraints, asked[SYMDYN_HELD];
 #endif
     int n_noted;
-    double noted[SYMDYN_NOTES * SYMDYN_NOTE];  // events, times, states before and after them, until they are taken
+    symdyn_noted noted[SYMDYN_NOTES];                   // until they are taken
+    double noted_states[SYMDYN_NOTES * 2 * SYMDYN_NX];  // before and after each of these
 } symdyn_events;

@@ -2,6 +2,9 @@
 // on a multiple of 64.
 #pragma once
 
+#if SYMDYN_EVENTS
+#include "noted_type.h"
+#endif
 #include "problem.h"
 #include "report_type.h"
 #include "time_type.h"
@@ -16,5 +19,5 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_rep
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing);
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *known, int reset);
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_reset)(void *memory, const int *fired, double *after);
-SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows);
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, symdyn_noted *noted, double *states);
 #endif

@@ -487,9 +487,9 @@ static int symdyn_phase(symdyn_hybrid *h) {
     const int status = code->go(code->memory, 0, h->most_steps, h->times + h->n_written, h->n_times - h->n_written,
         h->out + h->n_x * h->n_written, &written);
     if (status != SYMDYN_DONE && status != SYMDYN_STOPPED) return SYMDYN_LEFT;
-    const long n = code->take(code->memory, h->rows_of_events);
+    const long n = code->take(code->memory, h->noted, h->noted_states);
     for (long i = 0; i < n; i++)
-        if (h->rows_of_events[i * (2 + 2 * h->n_x)] < 0.0) return SYMDYN_LEFT;  // what was not resolved
+        if (h->noted[i].kind != SYMDYN_HAPPENED) return SYMDYN_LEFT;
     if ((status == SYMDYN_STOPPED) != (n > 0) || n > h->n_events || h->n_happened + n >= h->most_happened) return SYMDYN_LEFT;
     symdyn_report report;
     code->report(code->memory, &report, h->states);
@@ -497,13 +497,13 @@ static int symdyn_phase(symdyn_hybrid *h) {
         return SYMDYN_LEFT;
     if (held && !n && report.t < h->end && symdyn_slips_back(h)) return SYMDYN_LEFT;
     for (long i = 0; i < n; i++) {
-        const double *const note = h->rows_of_events + i * (2 + 2 * h->n_x);
-        h->fired[i] = h->happened[h->n_happened] = (int)note[0];
-        h->happened_t[h->n_happened] = note[1];
-        for (int j = 0; j < 2 * h->n_x; j++) h->happened_states[2 * h->n_x * h->n_happened + j] = note[2 + j];
+        h->fired[i] = h->happened[h->n_happened] = h->noted[i].event;
+        h->happened_t[h->n_happened] = h->noted[i].t;
+        for (int j = 0; j < 2 * h->n_x; j++)
+            h->happened_states[2 * h->n_x * h->n_happened + j] = h->noted_states[2 * h->n_x * i + j];
         h->n_happened++;
     }
-    const double *const at_end = n ? h->rows_of_events + (n - 1) * (2 + 2 * h->n_x) + 2 : h->states;
+    const double *const at_end = n ? h->noted_states + 2 * h->n_x * (n - 1) : h->states;
     for (int i = 0; i < h->n_x; i++) h->x[i] = at_end[i];
     for (int k = 0; k < h->n_contacts; k++) {
         h->phase_mode[h->n_contacts * h->n_phases + k] = h->mode[k];

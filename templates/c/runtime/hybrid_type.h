@@ -1,6 +1,8 @@
 // A motion with rigid contacts that goes from phase to phase in C, see hybrid.h. All frames read the same t, x, inputs and p.
 #pragma once
 
+#include "noted_type.h"
+
 typedef struct {
     // The mechanism. Data of every contact: its first row, their number, whether the first one is a normal one, indices in p of
     // the marks that it is closed, that it sticks, of the sign of its slip, and the events that end its modes: closes, opens,
@@ -50,7 +52,8 @@ typedef struct {
     double *sign;                // of its slip, 0: none
     double *left;                // when it opened since nothing pressed it; -infinity: it did not
     int *old_mode, *old_still, *old_passed, *ruled_out, *look, *leaves;
-    double *old_sign, *old_x, *rows_of_events, *states, *ahead;
+    symdyn_noted *noted;  // of a phase
+    double *old_sign, *old_x, *noted_states, *states, *ahead;
 
     // Results. Output times with states; phases with their begin, end, parameters, modes, and how many output times,
     // events and impacts there are by their end; events and impacts.

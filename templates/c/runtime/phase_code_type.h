@@ -7,7 +7,7 @@ typedef struct {
     int (*start)(void *memory, const void *problem, const double *span, const double *x0, const double *atol);
     int (*go)(void *memory, int every, long max_steps, double *t, long n, double *x, long *written);
     void (*look)(void *memory, const int *look, double spacing);
-    long (*take)(void *memory, double *rows);
+    long (*take)(void *memory, void *noted, double *states);
     void (*report)(const void *memory, void *report, double *states);
     void *memory, *problem;
     double *p, *c;
