@@ -1,8 +1,8 @@
-// Instructions, counted by the timer of a Cortex-M under an emulator that runs one instruction in a nanosecond; elsewhere nothing.
+// Instructions, counted by the timer of a Cortex-M under an emulator that runs one in a nanosecond; elsewhere nothing.
 #pragma once
 
 #if defined(__ARM_ARCH) && defined(__thumb__)
-// SysTick counts down from 2^24 with the 25 MHz of the processor of the board: a tick is 40 instructions. It is read often enough.
+// SysTick counts down from 2^24 with the 25 MHz of the processor of the board: a tick is 40 instructions. Reads come often.
 #define TICK 40ul
 static unsigned long ticks(void) {
     volatile unsigned long *const timer = (volatile unsigned long *)0xE000E010ul;

@@ -44,7 +44,7 @@ static void symdyn_read(const symdyn_argument *argument, int64_t row) {
     const int64_t first = row * argument->n;
     for (int64_t k = 0; k < argument->n; k++) {
         argument->row[k] = argument->buffer->dtype == XLA_FFI_DataType_F32 ? ((const float *)argument->buffer->data)[first + k]
-                                                                            : ((const double *)argument->buffer->data)[first + k];
+                                                                           : ((const double *)argument->buffer->data)[first + k];
     }
 }
 
@@ -64,7 +64,8 @@ XLA_FFI_Error *symdyn_xla_rows(XLA_FFI_CallFrame *call) {
     }
     if (call->stage != XLA_FFI_ExecutionStage_EXECUTE) return NULL;
     int (*rows)(symdyn_frame *) = (int (*)(symdyn_frame *))(intptr_t)symdyn_attribute(&call->attrs, "rows");
-    int (*prologue)(const double *, double *) = (int (*)(const double *, double *))(intptr_t)symdyn_attribute(&call->attrs, "prologue");
+    int (*prologue)(const double *, double *) =
+        (int (*)(const double *, double *))(intptr_t)symdyn_attribute(&call->attrs, "prologue");
     const int64_t n_c = symdyn_attribute(&call->attrs, "n_c"), inner = symdyn_attribute(&call->attrs, "inner");
     const XLA_FFI_Buffer *out = call->rets.rets[0];
     const int64_t axes = out->rank - inner;
@@ -78,8 +79,8 @@ XLA_FFI_Error *symdyn_xla_rows(XLA_FFI_CallFrame *call) {
     }
     double *memory = malloc((size_t)(needed + size) * sizeof(double));
     if (!memory) {
-        XLA_FFI_Error_Create_Args error = {XLA_FFI_Error_Create_Args_STRUCT_SIZE, NULL, "there is no memory left",
-                                           XLA_FFI_Error_Code_RESOURCE_EXHAUSTED};
+        XLA_FFI_Error_Create_Args error = {
+            XLA_FFI_Error_Create_Args_STRUCT_SIZE, NULL, "there is no memory left", XLA_FFI_Error_Code_RESOURCE_EXHAUSTED};
         return call->api->XLA_FFI_Error_Create(&error);
     }
     double *next = memory, *result = memory + needed;
@@ -98,13 +99,15 @@ XLA_FFI_Error *symdyn_xla_rows(XLA_FFI_CallFrame *call) {
             stopped = prologue(arguments[4].row, c);
             latest = row;
         }
-        symdyn_frame frame = {1, arguments[0].row, arguments[1].row, arguments[2].row, arguments[3].row, arguments[4].row, c, result,
-                              1, 1, 1, 1, 0};
+        symdyn_frame frame = {1, arguments[0].row, arguments[1].row, arguments[2].row, arguments[3].row, arguments[4].row, c,
+            result, 1, 1, 1, 1, 0};
         const int failed = stopped || rows(&frame);
         for (int64_t k = 0; k < size; k++) {
             const double value = failed ? NAN : result[k];
-            if (out->dtype == XLA_FFI_DataType_F32) ((float *)out->data)[state * size + k] = (float)value;
-            else ((double *)out->data)[state * size + k] = value;
+            if (out->dtype == XLA_FFI_DataType_F32)
+                ((float *)out->data)[state * size + k] = (float)value;
+            else
+                ((double *)out->data)[state * size + k] = value;
         }
     }
     free(memory);

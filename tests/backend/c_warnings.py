@@ -18,7 +18,6 @@ ALLOWED_WARNINGS = {
     "unused-macros": "sizes of a mechanism are written down whether or not one of its parts reads them",
     "unsafe-buffer-usage": "it asks for the containers of C++; arrays and pointers are what C has",
     "implicit-void-ptr-cast": "it asks for a cast that only C++ needs",
-    "default-const-init-var": "in C a constant without a value is zero; only C++ forbids it",
 }
 # Checks of bugprone-* and clang-analyzer-*.
 ALLOWED_CHECKS = {

@@ -1,5 +1,5 @@
-// The functions of the CUDA driver that symdyn calls, on the processor: memory is this process's, streams do at once what they are
-// given, and a module is the library that the environment variable FAKE_KERNELS names. SIZE: bytes of a kernel's argument.
+// The functions of the CUDA driver that symdyn calls, on the processor: memory is this process's, streams do at once what they
+// are given, and a module is the library that the environment variable FAKE_KERNELS names. SIZE: bytes of a kernel's argument.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdio.h>
@@ -59,7 +59,8 @@ int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *s
     return memcpy(to, (const void *)from, size), stream ? OK : INVALID;
 }
 int cuModuleLoadData(void **module, const void *image) {
-    if (memcmp(image, "\x7f" "ELF", 4)) return INVALID;  // machine code is an ELF file
+    static const char elf[4] = {0x7f, 'E', 'L', 'F'};
+    if (memcmp(image, elf, sizeof elf)) return INVALID;  // machine code is an ELF file
     *module = dlopen(getenv("FAKE_KERNELS"), RTLD_NOW);
     return n_modules++, *module ? OK : NOT_FOUND;
 }

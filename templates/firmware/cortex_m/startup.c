@@ -3,8 +3,7 @@ extern unsigned long stack_top;
 void _start(void);
 
 static void fault(void) {
-    for (;;) {
-    }
+    for (;;) {}
 }
 
 void reset(void) {
