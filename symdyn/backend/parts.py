@@ -47,9 +47,10 @@ class Parts:
             raise SymdynError(f"{name}: #if without #endif; close the condition")
         return _spaced(lines)
 
-    def alone(self, name: str) -> str:
-        """The text of a file with all that it includes, whatever earlier calls gave."""
-        return Parts(self._read, self._switches).text(name)
+    @property
+    def another(self) -> Parts:
+        """Parts of another text, with the same switches, in which none stands so far."""
+        return Parts(self._read, self._switches)
 
     def _lines_of(self, name: str, include: re.Match[str], files: Mapping[str, str]) -> list[str]:
         if include["file"]:

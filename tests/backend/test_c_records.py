@@ -10,8 +10,11 @@ import pytest
 
 from symdyn.backend import c_records
 from symdyn.errors import SymdynError
+from symdyn.runtime.batches.motions import BatchMotions
 from symdyn.runtime.batches.states import Table
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.gpu.motions import Motions
+from symdyn.runtime.gpu.states import StateRows
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.hybrid import PhaseCode, Record
 from symdyn.runtime.integrating.run_record import STATUS, Noted, RunReport
@@ -19,7 +22,9 @@ from tests.backend.c_warnings import RUNTIME
 
 RECORDS = {"runtime/report_type.h": (RunReport, "symdyn_report"), "runtime/problem_type.h": (Problem, "symdyn_problem"),
            "runtime/table_type.h": (Table, "symdyn_table"), "runtime/hybrid_type.h": (Record, "symdyn_hybrid"),
-           "runtime/phase_code_type.h": (PhaseCode, "symdyn_phase_code"), "runtime/noted_type.h": (Noted, "symdyn_noted")}
+           "runtime/phase_code_type.h": (PhaseCode, "symdyn_phase_code"), "runtime/noted_type.h": (Noted, "symdyn_noted"),
+           "runtime/batch_type.h": (BatchMotions, "symdyn_batch_motions"), "runtime/motions_type.h": (Motions, "symdyn_motions"),
+           "runtime/states_type.h": (StateRows, "symdyn_state_rows")}
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

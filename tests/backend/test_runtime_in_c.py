@@ -24,6 +24,8 @@ from symdyn.backend.methods.gauss import OfGauss
 from symdyn.backend.methods.radau import FIVE_STAGES, THREE_STAGES
 from symdyn.backend.packed import Pattern
 from symdyn.backend.source import _shipped, template_folders
+from symdyn.runtime.batches.motions import BatchMotions
+from symdyn.runtime.batches.states import Table
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.run_record import NOTED, STATUS, Noted, RunReport
@@ -532,10 +534,6 @@ static int symdyn_one(double t, const double *x, const double *inputs, const dou
 """
 
 
-class Table(ctypes.Structure):
-    _fields_ = [("at", ctypes.c_void_p), ("row", ctypes.c_long), ("entry", ctypes.c_long)]
-
-
 def test_oscillators_in_lanes(build: Build, tmp_path: Path) -> None:
     """Right-hand sides and motions of more oscillators than a vector has lanes, one of them with a negative stiffness."""
     shape = Shape({"q": 1, "u": 1, "z": 0, "inputs": 0}, 0, (), ())
@@ -559,10 +557,10 @@ def test_oscillators_in_lanes(build: Build, tmp_path: Path) -> None:
     library.symdyn_batch_size.restype = library.symdyn_batch_go.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(library.symdyn_batch_size() + 64)
     address = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
-    given = (Table * 3)(tables[1], tables[2], tables[3])
-    real = (ctypes.c_void_p * 3)(span.ctypes.data, atol.ctypes.data, times.ctypes.data)
-    into = (ctypes.c_void_p * 2)(states.ctypes.data, both.ctypes.data)
-    library.symdyn_batch_start(address, given, pointer(np.array([n, 7])), real, into, pointer(reports))
+    arrays = {"span": span, "atol": atol, "t_out": times, "x_out": states, "states": both, "reports": reports}
+    motions = BatchMotions(n=n, n_out=7, **dict(zip(("x", "inputs", "p"), map(ctypes.addressof, tables[1:]), strict=True)),
+                           **{name: values.ctypes.data for name, values in arrays.items()})
+    library.symdyn_batch_start(address, ctypes.byref(motions))
     assert library.symdyn_batch_go(address, ctypes.c_long(10_000)) == n
     w = np.sqrt(np.abs(stiffness))[:, None]
     np.testing.assert_allclose(states[good, :, 0], np.cos(w * times)[good], rtol=0, atol=1e-9)

@@ -73,18 +73,29 @@ static int one_trajectory(const double *span) {
 #ifdef BATCH
 static int in_lanes(const double *span) {
     void *const batch = memory_of(OF(_batch_size)());
-    const long counts[2] = {N_STATES, N_TIMES}, out_steps[2] = {N_X, 1};
+    const long out_steps[2] = {N_X, 1};
     double several[N_STATES * N_X], out[N_STATES * N_X], ends[N_STATES * 2 * N_X];
-    const double zero = 0.0, *const real[3] = {span, tolerances, times};
-    double *const results[2] = {states, ends};
+    const double zero = 0.0, one = 1.0;
     symdyn_report reports[N_STATES];
     int codes[N_STATES], wrong = 0;
     for (int i = 0; i < N_STATES; i++)
         for (int k = 0; k < N_X; k++) several[i * N_X + k] = x0[k] + 0.01 * i * (k + 1);
-    const symdyn_table given[4] = {{&zero, 0, 0}, {several, N_X, 1}, {inputs, 0, 1}, {p, 0, 1}};
+    const symdyn_table given[4] = {{&zero, 0, 0}, {several, N_X, 1}, {inputs, 0, 1}, {p, 0, 1}}, length = {&one, 0, 1};
+    const symdyn_batch_motions motions = {.n = N_STATES,
+        .n_out = N_TIMES,
+        .x = given + 1,
+        .inputs = given + 2,
+        .p = given + 3,
+        .lengths = &length,
+        .span = span,
+        .atol = tolerances,
+        .t_out = times,
+        .x_out = states,
+        .states = ends,
+        .reports = reports};
     wrong += OF(_rhs_batch)(N_STATES, given, out, out_steps, codes) != 0;
     print_bits("x_dot", out, N_STATES * N_X);
-    OF(_batch_start)(batch, given + 1, counts, real, results, reports);
+    OF(_batch_start)(batch, &motions);
     wrong += OF(_batch_go)(batch, 100000) != N_STATES;
     for (int i = 0; i < N_STATES; i++) wrong += reports[i].status != 0;
     print_bits("lanes", states, N_STATES * N_TIMES * N_X);

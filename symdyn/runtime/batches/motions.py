@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.c_records import fields_of
 from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
@@ -29,7 +30,6 @@ from symdyn.runtime.gpu.device import device_number
 from symdyn.runtime.inputs.inputs import Inputs, demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
-from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import (
     RTOL,
@@ -56,6 +56,12 @@ IN_LANES = tuple(name for name, method in METHODS.items() if method.tableau is n
 # and 1 MiB for each core.
 MOST_ENTRIES = 3500
 NO_VECTORS = "the C compiler has no vectors"
+
+
+class BatchMotions(ctypes.Structure):
+    """Arguments and results of motions on vectors; see c/runtime/batch_type.h."""
+
+    _fields_ = fields_of("runtime/batch_type.h")
 
 
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
@@ -206,28 +212,25 @@ def _on_vectors(module: Module, asked: Asked, method: str, alone: Callable[[np.n
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
-    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (together.span, together.atol, asked.times)])
     assert isinstance(together.x, np.ndarray)  # a device has rows of its own
-    out = (ctypes.c_void_p * 2)(together.x.ctypes.data, together.states.ctypes.data)
-    pieces, stops = together.pieces, together.stops
-    problem = Problem(n_stops=len(stops), stops=stops.ctypes.data)
+    pieces, stops, looks = together.pieces, together.stops, asked.looks
+    tables = tables_of([together.starts, asked.inputs, together.params, together.lengths, together.atol])
+    motions = BatchMotions(
+        n=n, n_out=len(asked.times),
+        **dict(zip(("x", "inputs", "p", "lengths", "tolerances"), map(ctypes.addressof, tables), strict=True)),
+        span=together.span.ctypes.data, atol=together.atol.ctypes.data, t_out=asked.times.ctypes.data, n_stops=len(stops),
+        stops=stops.ctypes.data, look=together.look.ctypes.data if looks else None, event_spacing=asked.event_spacing,
+        events_taken_after=together.taken_after, x_out=together.x.ctypes.data, states=together.states.ctypes.data,
+        reports=together.reports.ctypes.data, doubts=together.doubts.ctypes.data)
     if pieces is not None:
         breaks, coefficients = (np.ascontiguousarray(a) for a in (pieces.breaks, pieces.coefficients))
-        problem.n_pieces, problem.breaks, problem.pieces = len(coefficients), breaks.ctypes.data, coefficients.ctypes.data
-    tables = tables_of([together.starts, asked.inputs, together.params, together.lengths, together.atol])
+        motions.n_pieces, motions.breaks, motions.pieces = len(coefficients), breaks.ctypes.data, coefficients.ctypes.data
     go = library.function("batch_go")
     go.restype = ctypes.c_long
     interrupted, done, waited = False, 0, 0
-    doubtful = bool(module.metadata.switches) or projects(module) or asked.looks
+    doubtful = bool(module.metadata.switches) or projects(module) or looks
     try:
-        if module.metadata.inputs:
-            library.function("batch_inputs")(batch, ctypes.byref(problem))
-        if asked.looks:
-            library.function("batch_look")(batch, ctypes.c_void_p(together.look.ctypes.data),
-                                           ctypes.c_double(asked.event_spacing), ctypes.c_long(together.taken_after),
-                                           ctypes.c_void_p(together.doubts.ctypes.data))
-        library.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
-                                        ctypes.c_void_p(together.reports.ctypes.data))
+        library.function("batch_start")(batch, ctypes.byref(motions))
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (doubtful and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:

@@ -13,10 +13,9 @@ SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, dou
 // Number of lanes; 1: the compiler has no vectors.
 SYMDYN_EXPORT int SYMDYN_NAME(batch_width)(void) { return SYMDYN_WIDTH; }
 
-// Parameters and inputs of a trajectory into a lane; of the last one for lanes that are left over. given: inputs, p. Returns what
-// the prologue does.
-static int symdyn_lanes_take(symdyn_states *lanes, int l, long i, const symdyn_table *given, double *numbers) {
-    const symdyn_table inputs = given[0], p = given[1];
+// Parameters and inputs of a trajectory into a lane; of the last one for lanes that are left over. Returns what the prologue
+// does.
+static int symdyn_lanes_take(symdyn_states *lanes, int l, long i, symdyn_table inputs, symdyn_table p, double *numbers) {
     double *c = numbers + SYMDYN_NP, *u = c + SYMDYN_NC;
     for (int k = 0; k < SYMDYN_NP; k++) numbers[k] = p.at[i * p.row + k * p.entry];
     const int code = SYMDYN_NAME(prologue)(numbers, c);
@@ -29,7 +28,7 @@ static int symdyn_lanes_take(symdyn_states *lanes, int l, long i, const symdyn_t
 // The right-hand side of n states. codes: of each, what the function `reason` explains; returns how many are not 0.
 // given: t, x (SYMDYN_NX), inputs (SYMDYN_NIN), p (SYMDYN_NP); out_steps: from state to state, from entry to entry.
 SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, double *out, const long *out_steps, int *codes) {
-    const symdyn_table t = given[0], x = given[1];
+    const symdyn_table t = given[0], x = given[1], inputs = given[2], p = given[3];
     double numbers[SYMDYN_WIDTH][SYMDYN_NUMBERS], one[SYMDYN_NX], result[SYMDYN_NX];
     int prologue[SYMDYN_WIDTH] = {0};
     symdyn_states lanes;
@@ -40,7 +39,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, dou
         long long any = 0;
         for (int l = 0; l < SYMDYN_WIDTH; l++) {
             const long i = first + l < n ? first + l : n - 1;
-            if (first == 0 || given[2].row || given[3].row) prologue[l] = symdyn_lanes_take(&lanes, l, i, given + 2, numbers[l]);
+            if (first == 0 || inputs.row || p.row) prologue[l] = symdyn_lanes_take(&lanes, l, i, inputs, p, numbers[l]);
             LANE(times, l) = t.at[i * t.row];
             if (!contiguous)
                 for (int k = 0; k < SYMDYN_NX; k++) LANE(lanes.x[k], l) = x.at[i * x.row + k * x.entry];
@@ -59,9 +58,9 @@ SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, dou
             double *to = out + (first + l) * out_steps[0];
             int code = prologue[l];
             if (!code && LANE(fault, l)) {
-                const double *p = numbers[l], *c = p + SYMDYN_NP, *inputs = c + SYMDYN_NC;
+                const double *own = numbers[l], *c = own + SYMDYN_NP, *u = c + SYMDYN_NC;
                 for (int k = 0; k < SYMDYN_NX; k++) one[k] = LANE(lanes.x[k], l);
-                code = symdyn_one(LANE(times, l), one, inputs, p, c, result);
+                code = symdyn_one(LANE(times, l), one, u, own, c, result);
                 if (!code && !symdyn_all_finite(result, SYMDYN_NX)) code = SYMDYN_NOT_FINITE;
                 for (int k = 0; k < SYMDYN_NX; k++) LANE(xd[k], l) = result[k];
             }

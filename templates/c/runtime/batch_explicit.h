@@ -4,34 +4,25 @@
 #pragma once
 
 #include "batch.h"
+#include "batch_type.h"
 #include "simulate.h"
 #if SYMDYN_EVENTS
 #include "dropped_events.h"
 #endif
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void);
-#if SYMDYN_HAS_INPUTS
-SYMDYN_EXPORT void SYMDYN_NAME(batch_inputs)(void *memory, const symdyn_problem *problem);
-#endif
-#if SYMDYN_EVENTS
-SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double spacing, long taken_after, int *doubts);
-#endif
-SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
-    const double *const *real, double *const *out, symdyn_report *reports);
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_batch_motions *motions);
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps);
 
-// Zeros until batch_inputs, batch_look and batch_start.
+// Zeros until batch_start.
 typedef struct {
     symdyn_states lanes;
     symdyn_vector k[SYMDYN_STAGES + 1][SYMDYN_NX];
     symdyn_run run[SYMDYN_WIDTH];
     double numbers[SYMDYN_WIDTH][SYMDYN_NUMBERS];
     long row[SYMDYN_WIDTH], written[SYMDYN_WIDTH];  // -1: no trajectory
-    const symdyn_table *given;
-    const double *span, *atol, *t_out;
-    double *x_out, *states;
-    symdyn_report *report;
-    long n, n_out, next, n_done;
+    symdyn_batch_motions motions;
+    long next, n_done;
 #if SYMDYN_SENSITIVE
     symdyn_vector tolerated[SYMDYN_NX];  // the absolute tolerances of each lane
 #endif
@@ -39,10 +30,7 @@ typedef struct {
     symdyn_problem over_time;  // inputs that are the same for all, if they have pieces
 #endif
 #if SYMDYN_EVENTS
-    const int *look;  // 0: for none
-    double spacing;
-    long taken_after, attempts[SYMDYN_WIDTH];  // attempted steps of the trajectory
-    int *doubts;
+    long attempts[SYMDYN_WIDTH];  // attempted steps of the trajectory
 #endif
 } symdyn_batch;
 
@@ -58,31 +46,32 @@ static void symdyn_batch_state(symdyn_batch *batch, int l) {
 // Write the requested times that a lane has passed. Report on its trajectory if that has ended, and begin the next that does not
 // end at once, if there is one.
 static void symdyn_batch_next(symdyn_batch *batch, int l) {
+    const symdyn_batch_motions *const motions = &batch->motions;
     symdyn_run *run = batch->run + l;
     double x0[SYMDYN_NX], *p = batch->numbers[l], *c = p + SYMDYN_NP;
     symdyn_problem problem = {.p = p, .c = c, .inputs = c + SYMDYN_NC, .project = 1};
     for (;;) {
         const long row = batch->row[l];
         if (row >= 0) {
-            double *x = batch->x_out + row * batch->n_out * SYMDYN_NX;
-            const int bad = run->status < 0 ? 0 : symdyn_serve(run, batch->t_out, batch->n_out, x, batch->written + l);
+            double *x = motions->x_out + row * motions->n_out * SYMDYN_NX;
+            const int bad = run->status < 0 ? 0 : symdyn_serve(run, motions->t_out, motions->n_out, x, batch->written + l);
             if (bad) run->status = bad;
 #if SYMDYN_EVENTS
-            if (batch->look && (run->status != SYMDYN_STEP_LIMIT || batch->attempts[l] % batch->taken_after == 0))
-                symdyn_drop_events(run, batch->doubts + row);
+            if (motions->look && (run->status != SYMDYN_STEP_LIMIT || batch->attempts[l] % motions->events_taken_after == 0))
+                symdyn_drop_events(run, motions->doubts + row);
 #endif
             if (run->status == SYMDYN_STEP_LIMIT) return;
 #if SYMDYN_EVENTS
-            if (run->status == SYMDYN_STOPPED && batch->n_out == 1 && batch->written[l] == 0)
+            if (run->status == SYMDYN_STOPPED && motions->n_out == 1 && batch->written[l] == 0)
                 for (int k = 0; k < SYMDYN_NX; k++) x[k] = run->x[k];  // the end alone is kept: where it ended
 #endif
             batch->row[l] = -1;
             batch->n_done++;
-            SYMDYN_NAME(simulation_report)(run, batch->report + row, batch->states + row * 2 * SYMDYN_NX);
+            SYMDYN_NAME(simulation_report)(run, motions->reports + row, motions->states + row * 2 * SYMDYN_NX);
         }
-        if (batch->next >= batch->n) return;
+        if (batch->next >= motions->n) return;
         const long i = batch->row[l] = batch->next++;
-        const int code = symdyn_lanes_take(&batch->lanes, l, i, batch->given + 1, p);
+        const int code = symdyn_lanes_take(&batch->lanes, l, i, *motions->inputs, *motions->p, p);
         batch->written[l] = 0;
 #if SYMDYN_HAS_INPUTS
         problem.n_pieces = batch->over_time.n_pieces;
@@ -92,24 +81,25 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
         problem.stops = batch->over_time.stops;
 #endif
 #if SYMDYN_HAS_CONSTRAINTS
-        problem.length = batch->given[3].at[i * batch->given[3].row];
+        problem.length = motions->lengths->at[i * motions->lengths->row];
 #endif
-        for (int k = 0; k < SYMDYN_NX; k++) x0[k] = batch->given->at[i * batch->given->row + k * batch->given->entry];
+        for (int k = 0; k < SYMDYN_NX; k++) x0[k] = motions->x->at[i * motions->x->row + k * motions->x->entry];
 #if SYMDYN_SENSITIVE
+        const symdyn_table tolerances = *motions->tolerances;
         double atol[SYMDYN_NX];
         for (int k = 0; k < SYMDYN_NX; k++)
-            atol[k] = LANE(batch->tolerated[k], l) = batch->given[4].at[i * batch->given[4].row + k * batch->given[4].entry];
+            atol[k] = LANE(batch->tolerated[k], l) = tolerances.at[i * tolerances.row + k * tolerances.entry];
 #else
-        const double *const atol = batch->atol;
+        const double *const atol = motions->atol;
 #endif
-        SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, atol);
+        SYMDYN_NAME(simulation_start)(run, &problem, motions->span, x0, atol);
         if (code) {
             run->status = SYMDYN_NO_CONSTANTS;
             run->reason = code;
         }
 #if SYMDYN_EVENTS
         batch->attempts[l] = 0;
-        if (batch->look) SYMDYN_NAME(simulation_look)(run, batch->look, batch->spacing);
+        if (motions->look) SYMDYN_NAME(simulation_look)(run, motions->look, motions->event_spacing);
 #endif
         symdyn_batch_state(batch, l);
     }
@@ -158,7 +148,7 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
     int failure[SYMDYN_WIDTH], late[SYMDYN_WIDTH];
 #if SYMDYN_EVENTS
     int waits[SYMDYN_WIDTH] = {0};  // there is no step now
-    for (int l = 0; l < SYMDYN_WIDTH && batch->look; l++) {
+    for (int l = 0; l < SYMDYN_WIDTH && batch->motions.look; l++) {
         if (batch->row[l] < 0) continue;
         batch->attempts[l]++;
         waits[l] = symdyn_resume(batch->run + l);
@@ -191,9 +181,9 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
         for (int l = 0; l < SYMDYN_WIDTH; l++)
             LANE(size, l) = fabs(LANE(x[i], l)) > fabs(LANE(y[i], l)) ? fabs(LANE(x[i], l)) : fabs(LANE(y[i], l));
 #if SYMDYN_SENSITIVE
-        scale = 1.0 / (batch->tolerated[i] + batch->span[2] * size + 1e-300);
+        scale = 1.0 / (batch->tolerated[i] + batch->motions.span[2] * size + 1e-300);
 #else
-        scale = 1.0 / (batch->atol[i] + batch->span[2] * size + 1e-300);
+        scale = 1.0 / (batch->motions.atol[i] + batch->motions.span[2] * size + 1e-300);
 #endif
         sum += (e * scale) * (e * scale);
 #if SYMDYN_SECOND_ERROR
@@ -264,13 +254,13 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
         symdyn_judge(run, failure[l] ? failure[l] : err[l] <= 1.0 ? late[l] : 0, err[l], root, x_new, xd_new);
         if (!run->rejected) {
             const long next = batch->written[l];
-            int within = next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0;
+            int within = next < batch->motions.n_out && (batch->motions.t_out[next] - run->t) * run->direction < 0.0;
 #if SYMDYN_EVENTS
-            within |= batch->look != 0;
+            within |= batch->motions.look != 0;
 #endif
             if (within) symdyn_batch_stages(batch, l);
 #if SYMDYN_EVENTS
-            if (batch->look) symdyn_look_for_events(run);
+            if (batch->motions.look) symdyn_look_for_events(run);
 #endif
             symdyn_batch_state(batch, l);
         }
@@ -280,42 +270,17 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_batch); }
 
+// Begin motions; what they point to has to stay.
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_batch_motions *motions) {
+    symdyn_batch *const batch = (symdyn_batch *)memory;
+    batch->motions = *motions;
 #if SYMDYN_HAS_INPUTS
-// Inputs over time, the same for all: pieces and stops of the problem; they have to stay.
-SYMDYN_EXPORT void SYMDYN_NAME(batch_inputs)(void *memory, const symdyn_problem *problem) {
-    ((symdyn_batch *)memory)->over_time = *problem;
-}
+    batch->over_time.n_pieces = motions->n_pieces;
+    batch->over_time.breaks = motions->breaks;
+    batch->over_time.pieces = motions->pieces;
+    batch->over_time.n_stops = motions->n_stops;
+    batch->over_time.stops = motions->stops;
 #endif
-
-#if SYMDYN_EVENTS
-// Events to look for, by samples no further apart than spacing, s (0: any); as if they were taken after so many attempted
-// steps; doubts: of every trajectory, zeros. All have to stay.
-SYMDYN_EXPORT void SYMDYN_NAME(batch_look)(void *memory, const int *look, double spacing, long taken_after, int *doubts) {
-    symdyn_batch *const batch = (symdyn_batch *)memory;
-    batch->look = look;
-    batch->spacing = spacing;
-    batch->taken_after = taken_after;
-    batch->doubts = doubts;
-}
-#endif
-
-// given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP), with constraints the lengths that residuals are
-// measured by (1), with sensitivities, behind these lengths or what stands in their place, absolute tolerances (SYMDYN_NX), which
-// replace atol; counts: trajectories, output times; real: span (t0, t_end, rtol, first step, largest step), atol (SYMDYN_NX),
-// output times; out: states at these (SYMDYN_NX each), states of the reports (2 SYMDYN_NX each); reports: one each. All have to
-// stay.
-SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
-    const double *const *real, double *const *out, symdyn_report *reports) {
-    symdyn_batch *const batch = (symdyn_batch *)memory;
-    batch->given = given;
-    batch->n = counts[0];
-    batch->n_out = counts[1];
-    batch->span = real[0];
-    batch->atol = real[1];
-    batch->t_out = real[2];
-    batch->x_out = out[0];
-    batch->states = out[1];
-    batch->report = reports;
     for (int l = 0; l < SYMDYN_WIDTH; l++) {
         batch->row[l] = -1;
         symdyn_batch_next(batch, l);
@@ -325,6 +290,6 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *gi
 // At most so many steps in every lane; returns how many trajectories have ended.
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps) {
     symdyn_batch *const batch = (symdyn_batch *)memory;
-    for (; max_steps > 0 && batch->n_done < batch->n; max_steps--) symdyn_batch_attempt(batch);
+    for (; max_steps > 0 && batch->n_done < batch->motions.n; max_steps--) symdyn_batch_attempt(batch);
     return batch->n_done;
 }
