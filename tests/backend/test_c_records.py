@@ -13,10 +13,12 @@ from symdyn.errors import SymdynError
 from symdyn.runtime.batches.motions import BatchMotions
 from symdyn.runtime.batches.states import Table
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.gpu.motions import Motions
 from symdyn.runtime.gpu.states import StateRows
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.hybrid import PhaseCode, Record
+from symdyn.runtime.integrating.mode_codes import KINDS, MODES
 from symdyn.runtime.integrating.run_record import STATUS, Noted, RunReport
 from tests.backend.c_warnings import RUNTIME
 
@@ -55,6 +57,12 @@ def test_codes_are_those_of_the_header() -> None:
     codes = vars(STATUS)
     assert (codes["DONE"], codes["STEP_LIMIT"], codes["STOPPED"], codes["FIELD_FAILED"]) == (0, 1, 3, -1)
     assert len(set(codes.values())) == len(codes) >= 15
+
+
+def test_modes_of_contacts_and_their_ends_are_those_of_the_headers() -> None:
+    assert MODES == (OPEN, STICKING, SLIDING) and KINDS == ("closes", "opens", "sticks", "slips", "ignored", "counts")
+    for file, names in (("runtime/modes.h", MODES), ("runtime/mode_events.h", KINDS)):
+        assert c_records.codes_of(file) == {name.upper(): k for k, name in enumerate(names)}
 
 
 @pytest.mark.parametrize(("text", "message"), [

@@ -15,7 +15,7 @@ from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.contact_laws import Site
-from symdyn.runtime.integrating import contacts, hybrid
+from symdyn.runtime.integrating import contacts, hybrid, mode_codes
 from symdyn.thresholds import DEPENDENT
 from tests.derivatives.test_periodic_contacts import after_heel_strike, walker
 from tests.helpers import swept
@@ -32,13 +32,13 @@ def hybrid_in_c() -> ctypes.CDLL:
 def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str], np.ndarray, np.ndarray]:
     """Result of C, and modes, forces and accelerations."""
     n, rows = len(sites), np.array([0 if site.bounded else len(site.rows) for site in sites], dtype=np.intc)
-    excluded = np.array([sum(1 << hybrid.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
+    excluded = np.array([sum(1 << mode_codes.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
     coefficients = np.array([[s.static, s.kinetic, 0.0 if s.slip is None or not len(s.slip) else s.slip[0]] for s in sites])
     mode, answer = np.zeros(n, dtype=np.intc), np.zeros(n + 2 * len(b))
     tolerances = np.array([laws.NOISE, DEPENDENT, laws.DIFFERENT])
     arrays = [rows, excluded, coefficients, np.ascontiguousarray(D), b, tolerances, mode, answer]
     found = hybrid_in_c().symdyn_hybrid_modes(n, *[ctypes.c_void_p(a.ctypes.data) for a in arrays])
-    return found, [hybrid.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
+    return found, [mode_codes.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
 
 
 @pytest.mark.parametrize(("n", "problems"), [(1, 6000), (2, 500), *swept([(3, 300)])])

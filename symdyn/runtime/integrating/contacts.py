@@ -36,7 +36,8 @@ from symdyn.runtime.contact_laws import (
 )
 from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
-from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, MODES, SHARED, Done, Laws, Motion
+from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, SHARED, Done, Laws, Motion
+from symdyn.runtime.integrating.mode_codes import MODES
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.slip_begins import LARGER, LONGEST, SHORTEST, TOLERATED, SlipBegins
 from symdyn.runtime.integrating.slip_begins import ROUNDED as RESOLVED

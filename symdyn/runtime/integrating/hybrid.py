@@ -24,6 +24,7 @@ from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.integrating import slip_begins
 from symdyn.runtime.integrating.compiled import FAR, Problem
+from symdyn.runtime.integrating.mode_codes import KINDS
 from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.run_record import Noted
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 CODES = SimpleNamespace(**codes_of("runtime/hybrid.h"))
-MODES = (laws.OPEN, laws.STICKING, laws.SLIDING)
-KINDS = ("closes", "opens", "sticks", "slips", "ignored", "counts")
 # Methods whose steps need no look in between; the law of impacts that C knows.
 METHODS, NEWTON = ("dop853", "bs54", "radau", "radau5"), "newton"
 # Phases, and attempted steps, of one call.

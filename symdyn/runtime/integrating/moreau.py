@@ -14,11 +14,11 @@ from symdyn.backend.c_records import codes_of
 from symdyn.backend.right_side import RightSide
 from symdyn.contact_kinds import CLUTCH, FRICTION
 from symdyn.errors import ArgumentError
-from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.contacts import SHARED, SOFTNESS, not_stepped
+from symdyn.runtime.integrating.mode_codes import MODES, SLIDING_CODE, STICKING_CODE
 from symdyn.runtime.integrating.moreau_groups import SPHERES, add_groups, n_speeds, room_of
 from symdyn.runtime.integrating.moreau_memory import MOST_DENSE, Cones, Memory, Moreau, cones
 from symdyn.runtime.integrating.outcome import Outcome, Phase, Request, Stepped, Touched
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 MOREAU = "moreau"
 GAPS, DIRECTIONS = "contact_gaps", "contact_directions"
-MODES = (laws.OPEN, laws.STICKING, laws.SLIDING)
-STICKING, SLIDING = 1, 2
 STATUS = SimpleNamespace(**codes_of("runtime/moreau.h"))
 KINDS = {CLUTCH: STATUS.SPEED, FRICTION: STATUS.BOUNDED}
 # Tolerances below this part are out of reach of a method whose impacts are of first order.
@@ -242,7 +240,7 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
     bounded = np.array([not record.normal for record in records], dtype=bool)[touched.a[named]]
     slips[touched.step[named], touched.a[named]] = np.where(bounded[:, None], rows[:, 1:3], rows[:, 2:4])
     sizes = np.linalg.norm(slips, axis=2, keepdims=True)
-    along = np.where((modes == SLIDING)[:, :, None] & (sizes > 0), slips / np.where(sizes > 0, sizes, 1.0), 0.0)
+    along = np.where((modes == SLIDING_CODE)[:, :, None] & (sizes > 0), slips / np.where(sizes > 0, sizes, 1.0), 0.0)
     phases: list[Phase] = []
     indices, latest = [], None
     for k in steps.tolist() if len(stepped.h) else []:
@@ -250,7 +248,7 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
         if here != latest:
             p = request.p.copy()
             for record, mode, direction in zip(records, modes[k].tolist(), along[k], strict=True):
-                closed, sticking = [mode != 0] * bool(record.closed), [mode == STICKING] * bool(record.sticking)
+                closed, sticking = [mode != 0] * bool(record.closed), [mode == STICKING_CODE] * bool(record.sticking)
                 values = [*closed, *sticking, *direction[:record.tangents]]
                 for name, value in zip(record.parameters, values, strict=True):
                     p[names.index(name)] = value

@@ -13,7 +13,8 @@ from symdyn.contact_kinds import CLUTCH, STOP
 from symdyn.errors import ArgumentError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
-from symdyn.runtime.integrating.moreau import GAPS, MODES, modes_of
+from symdyn.runtime.integrating.mode_codes import MODES
+from symdyn.runtime.integrating.moreau import GAPS, modes_of
 from symdyn.runtime.integrating.outcome import Impact, Phase, Stepped
 from symdyn.shown import shown
 

@@ -12,6 +12,7 @@
 
 #include "cones_type.h"
 #include "elimination.h"
+#include "modes.h"
 #include "prelude.h"
 
 // Relative velocities that changes of the speeds make along the rows of a contact.
@@ -149,12 +150,13 @@ static double symdyn_cones_missed(symdyn_cones *c) {
     for (long i = 0; i < c->n; i++) {
         const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
         double z[3], radius;
-        c->state[i] = c->bounded[i];
+        c->state[i] = c->bounded[i] ? SYMDYN_STICKING : SYMDYN_OPEN;
         if (symdyn_cones_idle(c, i)) continue;
         const double size = symdyn_cones_trial(c, i, z, &radius), scale = size > radius ? radius / size : 1.0;
         if (lead) worst = fmax(worst, fabs((z[0] > 0.0 ? z[0] : 0.0) - c->P[a]) * c->d_n[i]);
         for (long k = lead; k < m; k++) worst = fmax(worst, fabs(scale * z[k] - c->P[a + k]) * c->d_t[i]);
-        c->state[i] = lead && !(z[0] > 0.0) ? 0 : m == lead || size > radius || !(radius > 0.0) ? 2 : 1;
+        const int slides = m == lead || size > radius || !(radius > 0.0);
+        c->state[i] = lead && !(z[0] > 0.0) ? SYMDYN_OPEN : slides ? SYMDYN_SLIDING : SYMDYN_STICKING;
     }
     return worst;
 }
@@ -187,7 +189,7 @@ static void symdyn_cones_slip_rows(const symdyn_cones *c, long i, long row, long
 static long symdyn_cones_closed(const symdyn_cones *c) {
     long n = 0;
     for (long i = 0; i < c->n; i++)
-        if (c->state[i]) n += c->first[i + 1] - c->first[i];
+        if (c->state[i] != SYMDYN_OPEN) n += c->first[i + 1] - c->first[i];
     return n;
 }
 
@@ -196,13 +198,13 @@ static void symdyn_cones_matrix(symdyn_cones *c, long n, double *A) {
     for (int k = 0; k < c->n_u; k++) c->du[k] = 0.0;
     long column = 0;
     for (long j = 0; j < c->n; j++) {
-        if (!c->state[j]) continue;
+        if (c->state[j] == SYMDYN_OPEN) continue;
         for (long k = 0; k < c->first[j + 1] - c->first[j]; k++, column++) {
             const double unit[3] = {k == 0, k == 1, k == 2};
             long row = 0;
             symdyn_cones_push(c, j, unit, c->du);
             for (long i = 0; i < c->n; i++) {
-                if (!c->state[i]) continue;
+                if (c->state[i] == SYMDYN_OPEN) continue;
                 double w[3];
                 symdyn_cones_along(c, i, c->du, w);
                 for (long l = 0; l < c->first[i + 1] - c->first[i]; l++) A[row++ * n + column] = w[l];
@@ -216,7 +218,7 @@ static void symdyn_cones_matrix(symdyn_cones *c, long n, double *A) {
 // leave some impulses open: a little on the diagonal keeps their change small. Returns 0 where there is no step.
 static int symdyn_cones_newton(symdyn_cones *c, double little) {
     for (long i = 0; i < c->n; i++)
-        for (long r = c->first[i]; r < c->first[i + 1] && !c->state[i]; r++) c->P[r] = 0.0;
+        for (long r = c->first[i]; r < c->first[i + 1] && c->state[i] == SYMDYN_OPEN; r++) c->P[r] = 0.0;
     const long n = symdyn_cones_closed(c);
     if (n > c->most_dense) return 0;
     symdyn_cones_velocities(c);
@@ -225,7 +227,7 @@ static int symdyn_cones_newton(symdyn_cones *c, double little) {
     symdyn_cones_matrix(c, n, A);
     long row = 0;
     for (long i = 0; i < c->n; i++) {
-        if (!c->state[i]) continue;
+        if (c->state[i] == SYMDYN_OPEN) continue;
         const long a = c->first[i], m = c->first[i + 1] - a, lead = symdyn_cones_lead(c, i);
         for (long k = 0; k < m; k++) {
             const double d = k < lead ? c->d_n[i] : c->d_t[i];
@@ -233,13 +235,13 @@ static int symdyn_cones_newton(symdyn_cones *c, double little) {
             right[row + k] = d > 0.0 ? -c->w[a + k] / d : 0.0;
             A[(row + k) * n + row + k] += d > 0.0 ? little : 1.0;
         }
-        if (m > lead && c->state[i] == 2) symdyn_cones_slip_rows(c, i, row, n, A, right);
+        if (m > lead && c->state[i] == SYMDYN_SLIDING) symdyn_cones_slip_rows(c, i, row, n, A, right);
         row += m;
     }
     if (symdyn_solve_rows(n, n, A, right, 0.0)) return 0;
     row = 0;
     for (long i = 0; i < c->n; i++)
-        for (long r = c->first[i]; r < c->first[i + 1] && c->state[i]; r++) c->P[r] += right[row++];
+        for (long r = c->first[i]; r < c->first[i + 1] && c->state[i] != SYMDYN_OPEN; r++) c->P[r] += right[row++];
     c->n_newton++;
     return 1;
 }

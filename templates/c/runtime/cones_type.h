@@ -25,7 +25,7 @@ typedef struct {
     double *history;          // 2*SYMDYN_CONES_DEPTH*3*most: differences of changes, of swept impulses
     double *lead;             // by row: how far the next sweep starts from the latest one
     double *dense;            // most_dense*most_dense
-    int *state;               // of a contact after a solution: 0 open, 1 sticking, 2 sliding
+    int *state;               // of a contact after a solution: its mode, SYMDYN_OPEN, ...
     long n_sweeps, n_newton;  // done so far
     double residual;          // of the latest solution, m/s
 } symdyn_cones;

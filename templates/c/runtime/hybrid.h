@@ -6,6 +6,7 @@
 
 #include "contact_modes.h"
 #include "hybrid_type.h"
+#include "mode_events.h"
 #include "phase_code_type.h"
 #include "report_type.h"
 #include "status.h"
@@ -18,8 +19,6 @@ enum {
     SYMDYN_HYBRID_CONSTANTS = 4,  // constants that follow from the parameters cannot be computed
     SYMDYN_LEFT = -1              // of what is done within: it is left to the caller
 };
-
-enum { SYMDYN_CLOSES, SYMDYN_OPENS, SYMDYN_STICKS, SYMDYN_SLIPS, SYMDYN_IGNORED, SYMDYN_COUNTS, SYMDYN_KINDS };
 
 // Parts of what the function "contacts" gives.
 typedef struct {
@@ -58,7 +57,8 @@ static int symdyn_has_fired(const symdyn_hybrid *h, int contact, int kind) {
 
 // Move x by the rows' least change in the metric of the mass matrix that makes `wanted` of these rows: n of them. by: what x
 // changes by with forces along all rows.
-static int symdyn_moved(const symdyn_hybrid *h, int n, const int *row, double *wanted, const double *by, int n_by, double *x) {
+static int symdyn_move_along_rows(
+    const symdyn_hybrid *h, int n, const int *row, double *wanted, const double *by, int n_by, double *x) {
     const symdyn_numbers at = symdyn_parts(h);
     double A[2 * SYMDYN_MOST_ROWS][2 * SYMDYN_MOST_ROWS];
     for (int i = 0; i < n; i++)
@@ -83,7 +83,7 @@ static int symdyn_onto_surfaces(symdyn_hybrid *h, double t, double *x) {
             row[n++] = h->first[k];
         }
     if (n && most > 0.0) {
-        if (symdyn_moved(h, n, row, wanted, at.coordinates, h->n_q, x) || symdyn_look_at(h, t, x)) return SYMDYN_LEFT;
+        if (symdyn_move_along_rows(h, n, row, wanted, at.coordinates, h->n_q, x) || symdyn_look_at(h, t, x)) return SYMDYN_LEFT;
     }
     for (int k = 0; k < h->n_contacts; k++)
         if (h->mode[k] != SYMDYN_OPEN && h->still[k] && symdyn_friction_of(h, k) >= 0) {
@@ -92,7 +92,7 @@ static int symdyn_onto_surfaces(symdyn_hybrid *h, double t, double *x) {
         }
     if (!n) return 0;
     for (int i = 0; i < n; i++) wanted[i] = -at.slip[row[i]];
-    if (symdyn_moved(h, n, row, wanted, at.speeds, h->n_u, x + h->n_q)) return SYMDYN_LEFT;
+    if (symdyn_move_along_rows(h, n, row, wanted, at.speeds, h->n_u, x + h->n_q)) return SYMDYN_LEFT;
     return symdyn_look_at(h, t, x);
 }
 

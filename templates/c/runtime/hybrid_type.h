@@ -5,8 +5,8 @@
 
 typedef struct {
     // The mechanism. Data of every contact: its first row, their number, whether the first one is a normal one, indices in p of
-    // the marks that it is closed, that it sticks, of the sign of its slip, and the events that end its modes: closes, opens,
-    // sticks, slips, ignored, counts; -1: there is none.
+    // the marks that it is closed, that it sticks, of the sign of its slip, and the events that end its modes, of every kind in
+    // turn; -1: there is none.
     int n_q, n_u, n_state, n_x, n_p, n_contacts, n_rows, n_events;  // n_x: with the work of the loads
     const int *first, *rows, *normal, *closed_at, *sticking_at, *sliding_at, *event;
     int shared_at;  // place in p of the softness of rows that depend on each other

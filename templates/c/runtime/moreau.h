@@ -9,6 +9,7 @@
 // nonsmooth mechanical systems with unilateral contact and Coulomb's friction, 2013.
 #pragma once
 
+#include "elimination.h"
 #include "many.h"
 #include "modes.h"
 
@@ -51,12 +52,6 @@ static int symdyn_gaps(symdyn_moreau *s, double t, const double *x) {
     return s->reason ? SYMDYN_MOREAU_CONTACT : 0;
 }
 
-static double symdyn_size(const double *v, int n) {
-    double most = 0.0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-    return most;
-}
-
 // Put a state onto the constraints, and unit vectors to their length.
 static int symdyn_settle(symdyn_moreau *s, double t, double *x) {
     for (int group = 0; group < s->n_units; group++) {
@@ -70,7 +65,7 @@ static int symdyn_settle(symdyn_moreau *s, double t, double *x) {
         if (symdyn_look(s, t, x)) return SYMDYN_MOREAU_INPUTS;
         s->reason = s->position(s->position_frame);
         if (s->reason) return SYMDYN_MOREAU_CONSTRAINTS;
-        const double off = symdyn_size(s->position_change, s->n_c);
+        const double off = symdyn_most(s->position_change, s->n_c);
         for (int i = 0; i < s->n_q; i++) x[i] += s->position_change[s->n_c + i];
         if (symdyn_look(s, t, x)) return SYMDYN_MOREAU_INPUTS;
         s->reason = s->velocity(s->velocity_frame);
@@ -215,7 +210,7 @@ static long symdyn_earlier(const symdyn_moreau *s, long i) {
 }
 
 // Bound of friction of a contact, in a step of length h: a coefficient, of friction of a joint an impulse.
-static double symdyn_bound(const symdyn_moreau *s, long i, int sticks, double h) {
+static double symdyn_friction_bound(const symdyn_moreau *s, long i, int sticks, double h) {
     const double *coefficients = symdyn_coefficients(s, i);
     return coefficients[sticks ? 0 : 1] * (symdyn_bounded(s, i) ? h : 1.0);
 }
@@ -232,11 +227,12 @@ static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c, double h) {
     for (long i = 0; i < c->n; i++) {
         const long old = symdyn_earlier(s, i), r = c->first[i];
         const double *mu = symdyn_coefficients(s, i);
-        const int stuck = old < 0 || !s->old_state[old] ? symdyn_still(s, c, i) : s->old_state[old] == SYMDYN_STICKING;
+        const int stuck =
+            old < 0 || s->old_state[old] == SYMDYN_OPEN ? symdyn_still(s, c, i) : s->old_state[old] == SYMDYN_STICKING;
         const double *P = s->was_at[i] >= 0 ? s->P_guess + 3 * s->was_at[i] : old >= 0 ? s->P_old + 3 * old : 0;
         for (long k = r; k < c->first[i + 1]; k++) c->P[k] = P ? P[k - r] : 0.0;
         s->broken[i] = !stuck || !(mu[0] > mu[1]);
-        c->friction[i] = symdyn_bound(s, i, stuck, h);
+        c->friction[i] = symdyn_friction_bound(s, i, stuck, h);
     }
 }
 
@@ -261,7 +257,7 @@ static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c, double h, int rou
         for (long i = 0; i < c->n && !rough; i++)
             if (!s->broken[i] && symdyn_slips(s, c, i)) {
                 s->broken[i] = again = 1;
-                c->friction[i] = symdyn_bound(s, i, 0, h);
+                c->friction[i] = symdyn_friction_bound(s, i, 0, h);
             }
     }
 }
@@ -333,7 +329,7 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
         for (int k = 0; k < 3; k++) s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
         s->old_a[i] = s->a[i];
         s->old_b[i] = s->b[i];
-        s->old_state[i] = s->broken[i] || !c->state[i] || symdyn_slips(s, c, i) ? c->state[i] : SYMDYN_STICKING;
+        s->old_state[i] = s->broken[i] || c->state[i] == SYMDYN_OPEN || symdyn_slips(s, c, i) ? c->state[i] : SYMDYN_STICKING;
         if (s->b[i] >= 0 && s->old_from[s->a[i]] < 0) s->old_from[s->a[i]] = i;
     }
     s->n_old = s->n_found;
@@ -349,7 +345,7 @@ static long symdyn_order(const symdyn_moreau *s, const long *a, const long *b, l
 }
 
 // Add to the contacts of a step those whose gap closes at what the frames looked at last. added: whether there are new ones.
-static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
+static int symdyn_add_contacts(symdyn_moreau *s, symdyn_cones *c, int *added) {
     const long n_was = s->n_found;
     for (long i = 0; i < n_was; i++) {
         s->was_a[i] = s->a[i];
@@ -390,7 +386,7 @@ static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
 }
 
 // Relative velocities of the contacts of a step, and their tangents, at its begin.
-static int symdyn_begin(symdyn_moreau *s, double t, const double *x) {
+static int symdyn_begin_contacts(symdyn_moreau *s, double t, const double *x) {
     const int failed = symdyn_gaps(s, t, x);
     if (failed) return failed;
     for (long i = 0; i < s->n_found; i++) {
@@ -447,12 +443,12 @@ static int symdyn_add_closing(
     int failed = 0, more = 0;
     *added = 0;
     if (first) failed = symdyn_gaps(s, t, x);
-    if (first && !failed) failed = symdyn_add(s, c, added);
+    if (first && !failed) failed = symdyn_add_contacts(s, c, added);
     for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
     if (!failed) failed = symdyn_gaps(s, t + 0.5 * h, middle);
-    if (!failed) failed = symdyn_add(s, c, &more);
+    if (!failed) failed = symdyn_add_contacts(s, c, &more);
     *added |= more;
-    return failed || !*added ? failed : symdyn_begin(s, t, x);
+    return failed || !*added ? failed : symdyn_begin_contacts(s, t, x);
 }
 
 // Centres at what the frames looked at last.
