@@ -142,6 +142,41 @@ def test_names_have_the_words_of_the_field() -> None:
     assert wrong_words("runtime/gpu/device.py", {"kernel", "painter", "of"}) == {"painter"}
 
 
+def names_in_c(text: str) -> set[str]:
+    """Names in C, or in a template of it, without comments and files."""
+    return set(re.findall(r"[A-Za-z_]\w*", re.sub(r"//.*|#include .*", "", text)))
+
+
+def functions_in_c(text: str) -> set[str]:
+    """The functions, and macros like functions, that a file defines."""
+    begun = r"^(?:__attribute__\(\(\w+\)\) )?(?:static|SYMDYN_LINKED|#define)[\w\s*]*?\b(symdyn_\w+)\((?!.*;$)"
+    return set(re.findall(begun, text, re.MULTILINE))
+
+
+def test_names_in_c_have_the_words_of_the_field() -> None:
+    paths = [path for path in (ROOT / "templates").rglob("*") if path.is_file() and re.search(r"\.[ch](\.jinja)?$", path.name)]
+    assert len(paths) > 70 and names_in_c("int slope_beside;  // told\n") == {"int", "slope_beside"}
+    wrong = {(path.name, name) for path in paths for name in names_in_c(path.read_text(encoding="utf-8")) - {"SYMDYN_KERNEL"}
+             if not_names() & set(name.lower().split("_"))}
+    assert wrong == set()
+
+
+# What each method of integration, or each kind of matrices, defines.
+OF_METHODS = {"symdyn_try", "symdyn_between", "symdyn_begin", "symdyn_ahead", "symdyn_newton_matrix", "symdyn_newton_solve"}
+
+
+def test_functions_in_c_have_one_meaning() -> None:
+    """A name is defined in one file of the runtime."""
+    text = "static int symdyn_a(int b) {\nstatic int symdyn_b(void);\n#define symdyn_c(d) (d)\n"
+    assert functions_in_c(text) == {"symdyn_a", "symdyn_c"}
+    where: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "templates" / "c" / "runtime").glob("*.[ch]")):
+        for name in functions_in_c(path.read_text(encoding="utf-8")):
+            where.setdefault(name, []).append(path.name)
+    assert len(where) > 200
+    assert {name: files for name, files in where.items() if len(files) > 1 and name not in OF_METHODS} == {}
+
+
 def test_names_of_files_have_the_words_of_the_field() -> None:
     paths = [path.relative_to(ROOT).as_posix() for folder in ("symdyn", "templates", "tests", "docs", "notebooks")
              for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts]

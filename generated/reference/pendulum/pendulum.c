@@ -537,17 +537,17 @@ typedef double symdyn_time;
 
 typedef struct {
     symdyn_problem problem;
-    symdyn_time t, t_low;  // present time, and what rounding has cut off it: the time is t + t_low
-    symdyn_time t_end;     // where the run ends, hit exactly
-    double direction;      // sign of t_end - t0 (0 if they are equal)
-    symdyn_time t_slack,
-        h_floor;          // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
-    double h, h_max;      // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
-    double h_try, h_min;  // the step that is tried: its length with sign, the shortest one,
-    symdyn_time t_new, t_new_low;        // its end
-    double h_cut;                        // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
-    double rtol, atol[SYMDYN_NX];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
-    double root_old;                     // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
+    symdyn_time t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
+    symdyn_time t_end;             // where the run ends, hit exactly
+    double direction;              // sign of t_end - t0 (0 if they are equal)
+    symdyn_time t_slack;           // times closer than this to an end count as the end
+    symdyn_time h_floor;           // shortest step near t = 0, else 16 ulp of t
+    double h, h_max;               // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min;           // the step that is tried: its length with sign, the shortest one,
+    symdyn_time t_new, t_new_low;  // its end
+    double h_cut;                  // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
+    double rtol, atol[SYMDYN_NX];  // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;               // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
     double x[SYMDYN_NX], xd[SYMDYN_NX];  // state at t and its derivative
     symdyn_time t_old;                        // start of the latest accepted step,
     double h_old, x_old[SYMDYN_NX];           // its length, with sign, the state there
@@ -632,7 +632,7 @@ static inline double symdyn_root(double v) {
 
 // A step of an embedded explicit Runge-Kutta pair, and its polynomial.
 
-#define symdyn_moved(run, i, change) ((run)->x[i] + (change))
+#define symdyn_moved_entry(run, i, change) ((run)->x[i] + (change))
 
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
 SYMDYN_LINKED int symdyn_try(
@@ -647,7 +647,7 @@ SYMDYN_LINKED int symdyn_try(
         const double e = SYMDYN_E(k, i);
         const double slope = SYMDYN_B(k, i);
         const double e2 = SYMDYN_SECOND(k, i, slope);
-        x_new[i] = symdyn_moved(run, i, h * slope);
+        x_new[i] = symdyn_moved_entry(run, i, h * slope);
         const double scale = symdyn_scale(run, i, x_new[i]);
         sum += (e * scale) * (e * scale);
         sum2 += (e2 * scale) * (e2 * scale);
@@ -822,13 +822,13 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
 // Control of the steps: the length of the next one, and what becomes of one that was tried.
 
 // Where the next step has to end at the latest: at a kink of the inputs ahead, or with the run.
-static symdyn_time symdyn_bound(const symdyn_run *run) {
+static symdyn_time symdyn_next_stop(const symdyn_run *run) {
     return run->t_end;
 }
 
 // The step to be tried next.
 static void symdyn_propose(symdyn_run *run) {
-    const symdyn_time bound = symdyn_bound(run);
+    const symdyn_time bound = symdyn_next_stop(run);
     const double rest = fabs((bound - run->t) - run->t_low), least = 16.0 * symdyn_eps * fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;

@@ -266,7 +266,7 @@ static void symdyn_event_note(symdyn_run *run, int kind, int k, double t, const 
 // The right-hand side just before (way -1) or just after (way 1) an event at (t, x), where signs and conditions have the values
 // of that side: extrapolated from two states on the way, a millionth of the time in which the state changes away. Returns 0 or a
 // failure.
-static int symdyn_slope_beside(symdyn_run *run, double t, const double *x, double way, double *slope) {
+static int symdyn_one_sided_slope(symdyn_run *run, double t, const double *x, double way, double *slope) {
     double y[SYMDYN_NX], far[SYMDYN_NX];
     int failure = symdyn_eval(run, t, x, slope);
     if (failure) return failure;
@@ -384,8 +384,8 @@ static int symdyn_jump_columns(
 }
 
 // The slope at (t, x) between events at one time, where quantities of some have gone over, 1 in `sides`, and those of others have
-// not yet, -1: as symdyn_slope_beside, along the nearest way from (t, x) to that side. clear: whether there is one. before: the
-// slope before all of them. Returns 0 or a failure.
+// not yet, -1: as symdyn_one_sided_slope, along the nearest way from (t, x) to that side. clear: whether there is one. before:
+// the slope before all of them. Returns 0 or a failure.
 static int symdyn_slope_between(
     symdyn_run *run, double t, const double *x, const int *sides, const double *before, double *slope, int *clear) {
     enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
@@ -473,7 +473,7 @@ static int symdyn_in_order(
         sides[order[m]] = 1;
         for (int i = 0; i < SYMDYN_NX; i++) after[i] = now[i];
         if (symdyn_event[order[m]].resets && (failure = symdyn_event_reset(run, t, now, after))) return failure;
-        failure = m == n - 1 ? symdyn_slope_beside(run, t, after, 1.0, then)
+        failure = m == n - 1 ? symdyn_one_sided_slope(run, t, after, 1.0, then)
                              : symdyn_slope_between(run, t, after, sides, slope, then, &known);
         if (failure) return failure;
         *clear &= known;
@@ -544,9 +544,9 @@ static int symdyn_event_columns(symdyn_run *run, double t, const double *x, doub
     double slope[SYMDYN_NX], then[SYMDYN_NX], y[SYMDYN_NX];
     int failure, events[SYMDYN_N_EVENTS], all[SYMDYN_N_EVENTS], n = 0, n_fired = 0, ordered = 1;
     *changed = 0;
-    if ((failure = symdyn_slope_beside(run, t, x, -1.0, slope))) return failure;
+    if ((failure = symdyn_one_sided_slope(run, t, x, -1.0, slope))) return failure;
     for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? after[i] : x[i];
-    if ((failure = symdyn_slope_beside(run, t, y, 1.0, then))) return failure;
+    if ((failure = symdyn_one_sided_slope(run, t, y, 1.0, then))) return failure;
     if (!symdyn_jumps(x, after, slope, then)) return 0;
     *changed = 1;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) n_fired += all[k] = run->events.fired[k];

@@ -5,13 +5,13 @@
 
 #if SYMDYN_SINGLE
 // Entry i of the state, moved by a change; what rounding cuts off is kept, so that it does not build up over steps.
-static inline double symdyn_moved(symdyn_run *run, int i, double change) {
+static inline double symdyn_moved_entry(symdyn_run *run, int i, double change) {
     const double way = change + run->x_low[i], end = run->x[i] + way, back = end - run->x[i];
     run->x_new_low[i] = (run->x[i] - (end - back)) + (way - back);
     return end;
 }
 #else
-#define symdyn_moved(run, i, change) ((run)->x[i] + (change))
+#define symdyn_moved_entry(run, i, change) ((run)->x[i] + (change))
 #endif
 
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
@@ -24,7 +24,7 @@ SYMDYN_LINKED int symdyn_try(
     for (int i = 0; i < SYMDYN_NX; i++) k[0][i] = run->xd[i];
     SYMDYN_EACH_STAGE(SYMDYN_STAGE)
 #if SYMDYN_SLOPE_AT_END
-    for (int i = 0; i < SYMDYN_NX; i++) x_new[i] = symdyn_moved(run, i, h * (SYMDYN_B(k, i)));
+    for (int i = 0; i < SYMDYN_NX; i++) x_new[i] = symdyn_moved_entry(run, i, h * (SYMDYN_B(k, i)));
     if ((failure = symdyn_eval(run, t_new, x_new, xd_new))) return failure;
     for (int i = 0; i < SYMDYN_NX; i++) k[SYMDYN_STAGES][i] = xd_new[i];
 #endif
@@ -33,7 +33,7 @@ SYMDYN_LINKED int symdyn_try(
 #if SYMDYN_SECOND_ERROR
         const double slope = SYMDYN_B(k, i);
         const double e2 = SYMDYN_SECOND(k, i, slope);
-        x_new[i] = symdyn_moved(run, i, h * slope);
+        x_new[i] = symdyn_moved_entry(run, i, h * slope);
 #endif
         const double scale = symdyn_scale(run, i, x_new[i]);
         sum += (e * scale) * (e * scale);

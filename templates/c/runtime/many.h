@@ -144,7 +144,7 @@ static void symdyn_wrench(const double *normal, double arm, const double *d, dou
 }
 
 // From the centre of the second body of a pair to where the first one touches, along the normal: forces on both act at one point.
-static double symdyn_arm(const symdyn_moreau *s, long a, long b) {
+static double symdyn_pair_arm(const symdyn_moreau *s, long a, long b) {
     double normal[3];
     return symdyn_sphere(s, b)[0] + symdyn_pair(s, a, b, normal);
 }
@@ -157,7 +157,7 @@ static double symdyn_pair_speed(const symdyn_moreau *s, long a, long b, const do
     for (int k = 0; k < 6; k++) sum += six[k] * one[4 + k];
     if (b >= s->n_bodies) return sum;
     const double *two = symdyn_sphere(s, b);
-    symdyn_wrench(normal, symdyn_arm(s, a, b), d, six);
+    symdyn_wrench(normal, symdyn_pair_arm(s, a, b), d, six);
     for (int k = 0; k < 6; k++) sum -= six[k] * two[4 + k];
     return sum;
 }
@@ -181,7 +181,7 @@ static void symdyn_pair_along(const symdyn_moreau *s, symdyn_cones *c, long e, l
     const double *one = symdyn_sphere(s, a);
     symdyn_pair_product(s, one + 10, basis, -one[0], 1.0, m, c->along + 3 * e);
     if (b >= s->n_bodies) return;
-    symdyn_pair_product(s, symdyn_sphere(s, b) + 10, basis, symdyn_arm(s, a, b), -1.0, m, c->along + 3 * (e + s->n_speeds));
+    symdyn_pair_product(s, symdyn_sphere(s, b) + 10, basis, symdyn_pair_arm(s, a, b), -1.0, m, c->along + 3 * (e + s->n_speeds));
 }
 
 // Append the rows of a pair, along the normal alone or with its tangents.
@@ -190,7 +190,7 @@ static void symdyn_pair_rows(const symdyn_moreau *s, symdyn_cones *c, long a, lo
     const long e = c->entry[c->n];
     symdyn_pair_along(s, c, e, a, b, basis, m);
     symdyn_pair_product(s, s->response + 6 * n * a, basis, -symdyn_sphere(s, a)[0], 1.0, m, c->answer + 3 * e);
-    if (two) symdyn_pair_product(s, s->response + 6 * n * b, basis, symdyn_arm(s, a, b), -1.0, m, c->answer + 3 * (e + n));
+    if (two) symdyn_pair_product(s, s->response + 6 * n * b, basis, symdyn_pair_arm(s, a, b), -1.0, m, c->answer + 3 * (e + n));
     for (int i = 0; i < n; i++) {
         c->speed[e + i] = (int)s->speed_of[n * a + i];
         if (two) c->speed[e + n + i] = (int)s->speed_of[n * b + i];

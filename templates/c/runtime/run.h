@@ -9,17 +9,17 @@
 
 typedef struct {
     symdyn_problem problem;
-    symdyn_time t, t_low;  // present time, and what rounding has cut off it: the time is t + t_low
-    symdyn_time t_end;     // where the run ends, hit exactly
-    double direction;      // sign of t_end - t0 (0 if they are equal)
-    symdyn_time t_slack,
-        h_floor;          // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
-    double h, h_max;      // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
-    double h_try, h_min;  // the step that is tried: its length with sign, the shortest one,
-    symdyn_time t_new, t_new_low;        // its end
-    double h_cut;                        // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
-    double rtol, atol[SYMDYN_NX];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
-    double root_old;                     // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
+    symdyn_time t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
+    symdyn_time t_end;             // where the run ends, hit exactly
+    double direction;              // sign of t_end - t0 (0 if they are equal)
+    symdyn_time t_slack;           // times closer than this to an end count as the end
+    symdyn_time h_floor;           // shortest step near t = 0, else 16 ulp of t
+    double h, h_max;               // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min;           // the step that is tried: its length with sign, the shortest one,
+    symdyn_time t_new, t_new_low;  // its end
+    double h_cut;                  // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
+    double rtol, atol[SYMDYN_NX];  // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;               // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
     double x[SYMDYN_NX], xd[SYMDYN_NX];  // state at t and its derivative
 #if SYMDYN_SINGLE
     double x_low[SYMDYN_NX], x_new_low[SYMDYN_NX];  // what rounding has cut off x, and off the end of the step that is tried

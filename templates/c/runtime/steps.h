@@ -4,7 +4,7 @@
 #include "run.h"
 
 // Where the next step has to end at the latest: at a kink of the inputs ahead, or with the run.
-static symdyn_time symdyn_bound(const symdyn_run *run) {
+static symdyn_time symdyn_next_stop(const symdyn_run *run) {
 #if SYMDYN_HAS_INPUTS
     const symdyn_problem *const problem = &run->problem;
     const symdyn_time here = run->t + run->direction * run->t_slack;
@@ -25,7 +25,7 @@ static symdyn_time symdyn_bound(const symdyn_run *run) {
 
 // The step to be tried next.
 static void symdyn_propose(symdyn_run *run) {
-    const symdyn_time bound = symdyn_bound(run);
+    const symdyn_time bound = symdyn_next_stop(run);
     const double rest = fabs((bound - run->t) - run->t_low), least = 16.0 * symdyn_eps * fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;
