@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -59,16 +59,19 @@ def build(tmp_path: Path) -> Build:
 
 
 def integrator(method: str, shape: Shape, functions: dict[str, str], tmp_path: Path, further: str = "",
-               band: Band | None = None, corrections: Corrections | None = None) -> str:
+               band: Band | None = None, corrections: Corrections | None = None, series: Series | None = None) -> str:
     """A text that includes runtime.c with a model: statements of its functions by their names."""
     record = METHODS[method]
     gathered: Gathered = OfGauss(second_order=True) if method == "gauss" else Gathered()
     if method.startswith("radau"):
         assert record.gather is not None
         gathered = record.gather(SimpleNamespace(band=band))
+    if series is not None:
+        gathered = Gathered(unrolled=series.unrolled)
     context = {"integrator": Integrator(record, shape, gathered, (), ()),
                "manifold": Manifold(tuple(map(tuple, shape.unit_groups)), corrections)}
-    tables_text = _shipped(*template_folders()).get_template("c/interface.c.jinja").render(context)
+    tables_text = series.text if series is not None else _shipped(*template_folders()).get_template(
+        "c/interface.c.jinja").render(context)
     bodies = "".join(f"static int symdyn_{name}{BOUNDED if name.endswith('_of') else SIGNATURE} {{\n(void)problem;\n"
                      f"{'' if name.endswith('_of') else '(void)t, (void)x;'}\n{body}\nreturn 0;\n}}\n"
                      for name, body in functions.items())
@@ -126,7 +129,7 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-# Steps of "taylor" need series: see tests/runtime/test_taylor.py.
+# Steps of "taylor" need series, see below.
 @pytest.mark.parametrize("method", [m for m in METHODS if m != "taylor"])
 def test_an_oscillator(method: str, build: Build, tmp_path: Path) -> None:
     needed = {name: body for name, body in OSCILLATOR.items() if name == "field" or method.startswith("radau")}
@@ -138,6 +141,52 @@ def test_an_oscillator(method: str, build: Build, tmp_path: Path) -> None:
     assert report.status == STATUS.DONE and report.t == 10.0 and report.n_evaluations > report.n_steps > 5
     back = Run(library, [np.cos(10.0), -np.sin(10.0)], (10.0, 0.0), 1e-11).at(np.array([0.0]))
     np.testing.assert_allclose(back, [[1.0, 0.0]], rtol=0, atol=2e-8)
+
+
+class Series(NamedTuple):
+    """The recurrence of x_dot = -x^2, whose coefficients are x_k' = -(2 x_0 x_k + x_1 x_(k-1) + ... + x_(k-1) x_1)."""
+
+    unrolled: bool
+    orders: int
+
+    @property
+    def text(self) -> str:
+        """With one sum, or that among the four of a vector, whose others are zero."""
+        sums, row = (1, 3) if self.unrolled else (4, 24)
+        sizes = {"ORDERS": self.orders, "SUMS": sums, "BLOCK": sums, "BLOCK_LANES": sums, "ROW": row, "SERIES_NC": 1,
+                 "SERIES_START": 1, "INLINE": "", "EACH_ORDER(ORDER)": " ".join(f"ORDER({k + 1})" for k in range(self.orders))}
+        return "".join(f"#define SYMDYN_{name} {value}\n" for name, value in sizes.items()) + RECURRENCE
+
+
+RECURRENCE = """
+static int symdyn_constants(const double *p, double *out) { (void)p, (void)out; return 0; }
+static int symdyn_series_at(const symdyn_problem *problem, double t, const double *x, const double *c, double *out) {
+    (void)problem, (void)t, (void)c;
+    out[0] = -x[0]*x[0];
+    out[1] = x[0];
+    return 0;
+}
+static void symdyn_series_after(double k, const double *q, const double *sums, const double *z, const double *ud,
+    const double *factors, const double *p, const double *c, double *out) {
+    (void)k, (void)ud, (void)factors, (void)p, (void)c;
+    for (int i = 0; i < 2*SYMDYN_SUMS; i++) out[i] = i % SYMDYN_SUMS ? 0.0 : q[0];
+    out[2*SYMDYN_SUMS] = -(2.0*z[0]*q[0] + sums[0]);
+}
+"""
+
+
+@pytest.mark.parametrize(("unrolled", "orders"), [(True, 30), (False, 30), (True, 8)])
+def test_series_of_a_hyperbola(unrolled: bool, orders: int, build: Build, tmp_path: Path) -> None:
+    """x = 1/(1 + t), forwards and backwards, whether orders are written out or not, in few steps of a high order."""
+    shape = Shape({"q": 1, "u": 0, "z": 0, "inputs": 0}, 0, (), ())
+    library = build(integrator("taylor", shape, {"field": "out[0] = -x[0]*x[0];"}, tmp_path, series=Series(unrolled, orders)))
+    times = np.linspace(0, 10, 21)
+    run = Run(library, [1.0], (0.0, 10.0), 1e-13)
+    np.testing.assert_allclose(run.at(times)[:, 0], 1 / (1 + times), rtol=0, atol=2e-12)
+    report = run.report()
+    assert report.status == STATUS.DONE and (5 < report.n_steps < 25 if orders == 30 else report.n_steps > 50)
+    back = Run(library, [1 / 11], (10.0, 0.0), 1e-13).at(times[::-1].copy())
+    np.testing.assert_allclose(back[:, 0], 1 / (1 + times[::-1]), rtol=0, atol=1e-10)
 
 
 BAND = """

@@ -62,6 +62,10 @@ static SYMDYN_INLINE int symdyn_next(symdyn_run *run, double *rows, int k) {
     return 0;
 }
 
+// Order k where the orders are written out.
+#define SYMDYN_NEXT(k)                                                                                                           \
+    if (symdyn_next(run, rows, k)) goto expanded;
+
 // The series at run->x, from order 0.
 #if SYMDYN_UNROLLED
 __attribute__((noinline))
@@ -75,36 +79,7 @@ static void symdyn_expand(symdyn_run *run) {
     double *const rows = run->method.rows + run->method.skipped;
     for (int i = 0; i < SYMDYN_NX; i++) rows[2 * SYMDYN_SUMS + i] = run->method.start[i];
 #if SYMDYN_UNROLLED
-    if (symdyn_next(run, rows, 1)) goto expanded;
-    if (symdyn_next(run, rows, 2)) goto expanded;
-    if (symdyn_next(run, rows, 3)) goto expanded;
-    if (symdyn_next(run, rows, 4)) goto expanded;
-    if (symdyn_next(run, rows, 5)) goto expanded;
-    if (symdyn_next(run, rows, 6)) goto expanded;
-    if (symdyn_next(run, rows, 7)) goto expanded;
-    if (symdyn_next(run, rows, 8)) goto expanded;
-    if (symdyn_next(run, rows, 9)) goto expanded;
-    if (symdyn_next(run, rows, 10)) goto expanded;
-    if (symdyn_next(run, rows, 11)) goto expanded;
-    if (symdyn_next(run, rows, 12)) goto expanded;
-    if (symdyn_next(run, rows, 13)) goto expanded;
-    if (symdyn_next(run, rows, 14)) goto expanded;
-    if (symdyn_next(run, rows, 15)) goto expanded;
-    if (symdyn_next(run, rows, 16)) goto expanded;
-    if (symdyn_next(run, rows, 17)) goto expanded;
-    if (symdyn_next(run, rows, 18)) goto expanded;
-    if (symdyn_next(run, rows, 19)) goto expanded;
-    if (symdyn_next(run, rows, 20)) goto expanded;
-    if (symdyn_next(run, rows, 21)) goto expanded;
-    if (symdyn_next(run, rows, 22)) goto expanded;
-    if (symdyn_next(run, rows, 23)) goto expanded;
-    if (symdyn_next(run, rows, 24)) goto expanded;
-    if (symdyn_next(run, rows, 25)) goto expanded;
-    if (symdyn_next(run, rows, 26)) goto expanded;
-    if (symdyn_next(run, rows, 27)) goto expanded;
-    if (symdyn_next(run, rows, 28)) goto expanded;
-    if (symdyn_next(run, rows, 29)) goto expanded;
-    if (symdyn_next(run, rows, 30)) goto expanded;
+    SYMDYN_EACH_ORDER(SYMDYN_NEXT)
 expanded:
 #else
     for (int k = 1; !symdyn_next(run, rows, k); k++) {}
@@ -143,10 +118,10 @@ static int symdyn_ahead(symdyn_run *run) {
             continue;
         }
         h = 0.8 * run->method.unit * exp(-0.5 * fmax(log(before) / (run->method.order - 1), log(last) / run->method.order));
-        if (h > 1.5
-                * run->method
-                    .h_before) {  // the last ones vanish where a motion begins with symmetry; earlier ones are weighted by
-            double bound = h, weight = 1.0;  // a guess of 4 for the ratio of one to the next at the end of the step
+        // The last ones vanish where a motion begins with symmetry; earlier ones are weighted by a guess of 4 for the ratio of
+        // one to the next at the end of the step.
+        if (h > 1.5 * run->method.h_before) {
+            double bound = h, weight = 1.0;
             for (int k = run->method.order - 2; k > 0; k--) {
                 weight *= 0.0625;
                 bound = fmin(
@@ -159,8 +134,8 @@ static int symdyn_ahead(symdyn_run *run) {
         run->method.unit = exp2(floor(log2(far)));
     }
     if (!(h > 0.0)) return symdyn_fail(run, SYMDYN_STATE_NOT_FINITE, 0, -1, run->t, run->x);
-    run->h = run->method.h_before =
-        run->method.h_before == 0.0 && run->h > 0.0 ? fmin(run->h, h) : h;  // at first what was asked for
+    // At first it is what was asked for.
+    run->h = run->method.h_before = run->method.h_before == 0.0 && run->h > 0.0 ? fmin(run->h, h) : h;
     return SYMDYN_STEP_LIMIT;
 }
 
