@@ -12,7 +12,8 @@ _CONDITION = re.compile(r"#(?P<word>if|ifdef|ifndef|else|elif|endif)\b *(?P<rest
 
 
 class Parts:
-    """Parts of a text that is rendered once.
+    """Parts of a text that is rendered once. The comment at the head of a file stands where its own text begins, behind what it
+    includes, and not at all in front of includes alone.
 
     read      file name -> text
     switches  macro -> whether it is on; conditions of these alone are resolved, all others stay for the C preprocessor
@@ -33,16 +34,23 @@ class Parts:
             return ""
         self._included.add(name)
         lines: list[str] = []
+        head, source = _head(self._read(name).splitlines())
         # Whether the lines of each open condition are kept; None: it stays as it is written.
         open_conditions: list[bool | None] = []
-        for line in self._read(name).splitlines():
+        for line in source:
             condition = _CONDITION.match(line)
             if condition and self._resolved(condition, open_conditions):
                 continue
             if False in open_conditions or line == "#pragma once":
                 continue
             include = _INCLUDE.match(line)
-            lines += self._lines_of(name, include, files) if include else [line]
+            if include:
+                lines += self._lines_of(name, include, files)
+                continue
+            if head and line.strip():
+                lines += ["", *head, ""]
+                head = []
+            lines.append(line)
         if open_conditions:
             raise SymdynError(f"{name}: #if without #endif; close the condition")
         return _spaced(lines)
@@ -83,6 +91,13 @@ class Parts:
 
     def _is_on(self, factor: str) -> bool:
         return self._switches[factor.removeprefix("!")] != factor.startswith("!")
+
+
+def _head(lines: list[str]) -> tuple[list[str], list[str]]:
+    """The comment that a file begins with, if it is about all of it, and the other lines."""
+    n = next((k for k, line in enumerate(lines) if not line.startswith("//")), len(lines))
+    about_all = n < len(lines) and (not lines[n] or lines[n].startswith(("#pragma once", "#ifndef", "#include")))
+    return (lines[:n], lines[n:]) if about_all else ([], lines)
 
 
 def _spaced(lines: list[str]) -> str:

@@ -53,6 +53,32 @@ def test_a_condition_that_is_not_closed() -> None:
         parts({"a": "#if A\n1"}, A=True).text("a")
 
 
+def test_the_head_of_a_file_stands_where_its_own_text_begins() -> None:
+    files = {"list.h": '// List.\n#pragma once\n\n#include "a.h"\n#include "b.h"', "a.h": "// A.\n#pragma once\n\nint a;",
+             "b.h": '// B.\n#pragma once\n\n#include "a.h"\n#if X\n#include "c.h"\n#endif\n\nint b;', "c.h": "// C.\nint c;"}
+    assert parts(files, X=True).text("list.h") == "// A.\n\nint a;\n\n// C.\nint c;\n\n// B.\n\nint b;\n"
+
+
+# The parts that written files may have, by those that are asked for.
+ROOTS = ("runtime.c", "batch_explicit.h", "motions.h", "states.h", "rows.h", "sincos.h", "columns.h", "motion_columns.h",
+         "status_text.h", "symdyn_saddle.h", "symdyn_multipliers.h", "symdyn_catenary.h", "symdyn_cube.h", "symdyn_grid_spline.h",
+         "symdyn_line_spline.h", "symdyn_touching.h")
+
+
+def test_comments_of_written_files_name_no_other_files() -> None:
+    """Whoever has a written file has none of symdyn's."""
+    texts: dict[str, str] = {}
+    names = list(ROOTS)
+    while names:
+        name = names.pop()
+        if name not in texts:
+            texts[name] = (RUNTIME / name).read_text(encoding="utf-8")
+            names += re.findall(r'#include "(\w+\.h)"', texts[name])
+    assert len(texts) > 45
+    dangling = re.compile(r"//.*\b\w+\.(?:h|c|py|jinja)\b")
+    assert [(name, line) for name, text in texts.items() for line in text.splitlines() if dangling.search(line)] == []
+
+
 @pytest.mark.parametrize("path", sorted(RUNTIME.iterdir()), ids=lambda path: path.name)
 def test_parts_are_plain_c(path: Path) -> None:
     text = path.read_text(encoding="utf-8")

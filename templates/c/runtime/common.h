@@ -1,6 +1,4 @@
-// Declarations of all parts of the integrator of one mechanism. SYMDYN_MODEL: its sizes, tables and the functions that are
-// integrated.
-
+// Declarations of all parts of the integrator of one mechanism.
 #pragma once
 
 #include "problem.h"

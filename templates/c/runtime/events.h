@@ -1,5 +1,11 @@
-// Where quantities of events pass zero within a step. Their order is that of the functions events and event_resets; the numbers
-// of the test that finds zeros between samples are those of symdyn/panels.py.
+// Where quantities of events pass zero within a step. Their order is that of the functions events and event_resets.
+//
+// On a panel, a part of a step, a quantity is known by samples at Chebyshev nodes and one more for a check: it has no zero where
+// the mean of the polynomial through them is larger than all its other coefficients and its error, and at most one where that
+// holds for its derivative. The error is SYMDYN_PANEL_TAIL times the last two coefficients and SYMDYN_PANEL_CHECK times what the
+// polynomial is off at the check. What is between samples is bounded by interval arithmetic, where a quantity has bounds.
+// Panels on which this says nothing are halved. Source: Trefethen, Approximation Theory and Approximation Practice, 2013; Boyd,
+// SIAM J. Numer. Anal. 40 (2002), 1666.
 #pragma once
 
 #include "start.h"
@@ -129,8 +135,8 @@ static int symdyn_event_rounding(symdyn_run *run, double t, const double *x, dou
     return failure;
 }
 
-// The first quantity that may have zeros on a panel which the signs at its ends do not show, -1 if there is none: see
-// symdyn/panels.py. A quantity no larger than its rounding is not resolved any further.
+// The first quantity that may have zeros on a panel which the signs at its ends do not show, -1 if there is none. A
+// quantity no larger than its rounding is not resolved any further.
 static int symdyn_event_undecided(symdyn_run *run, double right, double (*v)[SYMDYN_N_EVENTS], const double *x) {
     double noise[SYMDYN_N_EVENTS];
     int known = 0;
@@ -182,8 +188,10 @@ static int symdyn_event_leaves(
     return 0;
 }
 
-// The first quantity that may have zeros between the samples of a panel, -1 if there is none: see symdyn/panels.py. Bounds of the
-// values alone, which are quick, leave little to do.
+// The first quantity that may have zeros between the samples of a panel, -1 if there is none: neither it nor its derivative nor
+// the second one keeps its sign within its bounds, and two samples, h apart, leave room for more than the signs there show: the
+// second derivative may reach 8/h^2 times the smaller of them and 2/h^2 times their difference. Bounds of the values alone, which
+// are quick, leave little to do.
 static int symdyn_event_unproved(
     symdyn_run *run, double left, double right, double (*v)[SYMDYN_N_EVENTS], double (*states)[SYMDYN_NX]) {
     double ud[6 * SYMDYN_LEAVES], bounds[6 * SYMDYN_N_EVENTS], ranges[2 * SYMDYN_N_EVENTS], noise[SYMDYN_N_EVENTS];
@@ -826,7 +834,7 @@ static void symdyn_look_for_events(symdyn_run *run) {
     symdyn_search_step(run);
 }
 
-// Before a step: begin to look, or go on from an event, before whose reset event_now has the changes of a small step. Returns 1
+// Before a step: begin to look, or go on from an event, before whose reset events.now has the changes of a small step. Returns 1
 // if there is to be no step now.
 static int symdyn_resume(symdyn_run *run) {
     const double step = run->events.begun ? 1e-6 * run->h_old : 1e-9 * (run->t_end - run->t);

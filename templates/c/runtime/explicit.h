@@ -46,7 +46,7 @@ SYMDYN_LINKED int symdyn_try(
     return 0;
 }
 
-// See explicit_again.h.
+// Across singular configurations, and where the polynomial is not good enough, steps of their own take its place.
 SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err);
 SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run);
 

@@ -1,5 +1,5 @@
-// Functions of the integrator that others call: see start.h, simulate.h and events.h. A run is memory of simulation_size bytes,
-// on a multiple of 64.
+// Functions of the integrator that others call, explained where they are defined. A run is memory of simulation_size bytes, on a
+// multiple of 64.
 #pragma once
 
 #if SYMDYN_EVENTS

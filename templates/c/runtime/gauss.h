@@ -1,4 +1,4 @@
-// Gauss collocation of SYMDYN_STAGES stages with constant steps; coefficients: see symdyn/backend/methods/gauss.py.
+// Gauss collocation of SYMDYN_STAGES stages with constant steps.
 #pragma once
 
 #include "run.h"

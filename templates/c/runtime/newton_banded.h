@@ -1,5 +1,5 @@
-// The matrices of Newton's iteration in an order in which they have a narrow band: see symdyn/backend/band.py. The first states
-// of symdyn_sequence are coordinates whose rate is a multiple of one other state, which their rows eliminate; states of the band
+// The matrices of Newton's iteration in an order in which they have a narrow band. The first states of
+// symdyn_sequence are coordinates whose rate is a multiple of one other state, which their rows eliminate; states of the band
 // come next, then those that nothing depends on. The derivative of state i has its entries from symdyn_first[i] to
 // symdyn_first[i + 1], their columns places in this order.
 #pragma once

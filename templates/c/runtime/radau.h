@@ -1,4 +1,4 @@
-// Implicit collocation by simplified Newton iteration: see symdyn/backend/methods/radau.py.
+// Implicit collocation by simplified Newton iteration.
 #pragma once
 
 #include "run.h"

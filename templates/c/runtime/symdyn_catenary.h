@@ -1,4 +1,4 @@
-// The force at the upper end of a hanging elastic line; see Catenary in symdyn/model/elements/catenary.py.
+// The force at the upper end of a hanging elastic line.
 #pragma once
 
 #include "prelude.h"

@@ -1,4 +1,4 @@
-// Part of the unit cube under water; see Cube in symdyn/model/elements/cube.py.
+// Part of the unit cube under water.
 #pragma once
 
 #include "prelude.h"

@@ -1,4 +1,4 @@
-// Factors of symmetric matrices: shared by symdyn_saddle.h and symdyn_multipliers.h.
+// Factors of symmetric matrices.
 #pragma once
 
 #include "prelude.h"

@@ -1,4 +1,4 @@
-// A spline over a grid by de Boor's algorithm; see symdyn/model/contacts/grid.py.
+// A spline over a grid by de Boor's algorithm.
 #pragma once
 
 #include "symdyn_bisection.h"

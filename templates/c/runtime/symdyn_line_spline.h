@@ -1,4 +1,4 @@
-// Polynomials piece by piece; see symdyn/model/contacts/grid.py.
+// Polynomials piece by piece.
 #pragma once
 
 #include "symdyn_bisection.h"

@@ -1,5 +1,5 @@
-// Multipliers of least norm; see Multipliers in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes of
-// all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
+// Multipliers of least norm. The largest sizes of all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with
+// SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
 #pragma once
 
 #include "symdyn_factors.h"

@@ -1,5 +1,5 @@
-// The iterated augmented Lagrangian; see Saddle in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes
-// of all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with SYMDYN_SADDLE_ONE_SIZE those of each.
+// The iterated augmented Lagrangian. The largest sizes of all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with
+// SYMDYN_SADDLE_ONE_SIZE those of each.
 #pragma once
 
 #include "symdyn_factors.h"

@@ -1,4 +1,4 @@
-// Where a round shape touches a curve or a surface; see symdyn/model/contacts/touching.py.
+// Where a round shape touches a curve or a surface.
 #pragma once
 
 #include "prelude.h"
