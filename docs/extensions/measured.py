@@ -39,6 +39,7 @@ COMMANDS = {
     "rolled": "symdyn bench rolled",
     "bridges": "symdyn bench bridges --sizes 20 50",
     "nets": "symdyn bench nets",
+    "windows": "symdyn bench windows",
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
     "optimize": "symdyn bench optimize",

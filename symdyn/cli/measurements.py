@@ -128,6 +128,10 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.nets:run", "nets of rods: growth, accelerations compared with 60 digits, energy", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of particles along a side (default: 5, 10)"}), _JSON)),
+    "windows": Measurement(
+        "symdyn.lab.windows:run", "chains of up to 100 four-bars: growth, accelerations compared with 60 digits, energy", (
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of four-bars (default: 25, 50, 100)"}), _JSON)),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),
