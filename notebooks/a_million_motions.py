@@ -60,7 +60,7 @@ seconds = time.perf_counter() - begun
 print(f"{len(q1)} motions, {many.n_failed} failed")
 
 # %% [markdown]
-# A rod that turns over leaves $|q_2| > \pi$. Which initial angles cannot do so for lack of energy is known in closed form:
+# A rod that turns over leaves $|q_2| > \pi$. The initial angles that cannot do so for lack of energy are known in closed form:
 # the upper rod down and the lower one up is the least energy with $q_2 = \pi$ (Heyl, *The double pendulum fractal*, 2008,
 # for point masses).
 

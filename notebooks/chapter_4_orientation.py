@@ -11,7 +11,7 @@
 # %% [markdown]
 # # Chapter 4: orientation
 #
-# How a body is turned takes three numbers. Three angles do it, but every choice of them fails somewhere: gimbal lock. Four
+# The orientation of a body takes three numbers. Three angles do it, but every choice of them fails somewhere: gimbal lock. Four
 # Euler parameters with one condition never fail. This is the lecture's chapter 4, from the arm of three links to
 # $\boldsymbol\omega = 2 \mathbf E \dot{\mathbf p}$.
 #

@@ -80,7 +80,7 @@ omega = 2 * np.pi * np.geomspace(0.2, 30, 200)
 assert np.allclose([gain(w) for w in omega], [closed_form(w, values["c_s"]) for w in omega], rtol=1e-9)
 
 # %% [markdown]
-# Whatever the spring and the damper are, at $\omega^2 = k_t/m_u$ the gain is $k_t/m_s$: the sum of the equations of both
+# For any spring and damper, at $\omega^2 = k_t/m_u$ the gain is $k_t/m_s$: the sum of the equations of both
 # bodies does not contain them. No suspension improves comfort there (Hedrick and Butsuen, *Invariant properties of
 # automotive suspensions*, 1990).
 

@@ -251,7 +251,7 @@ def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same:
     """Why exact algebra does not prove the sides of each pair equal; "" where it does, for real values of their symbols.
 
     bound   terms that a product may have; same: symbol -> the one that it is taken for
-    What stands in the way of all pairs together, such as a pair that is too large, is looked for pair by pair.
+    An obstacle to all pairs together, such as a pair that is too large, is looked for pair by pair.
     """
     try:
         nodes, symbols = recorded([with_known_angles(side) for pair in pairs for side in pair], same)

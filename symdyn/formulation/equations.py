@@ -182,7 +182,7 @@ class Equations(EquationsFacade):
         intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning, unit),
                    constants of the mechanism first, then sines and cosines, then what stands in several places
         on_constraints  True: made shorter by C = 0 and its rate; it equals the quantity where these hold
-        What is too large for exact algebra as a whole is written entry by entry, those that are too large alone as they were
+        A quantity too large for exact algebra as a whole is written entry by entry, entries too large alone as they were
         derived; nothing depends on time. Raises SymdynError for an unknown form, for one that is too large, and for a quantity
         that is too large to be read; ArgumentError for a form of what has none, and for constraints where there are none.
 

@@ -18,7 +18,7 @@ from symdyn.model.system import System
 CRANK, ROD = 0.15, 0.30  # lengths, m
 SPEED = 150.0  # rad/s
 END = 0.1  # s
-# Of the two sines at the start, m/s, and the turning of the chord, rad/s.
+# Rates of the two sines at the start, m/s, and the turning of the chord, rad/s.
 START = (0.444896105, 0.463434311e-2)
 TURNING = -74.9957670
 # At the end: angle of the chord (rad), slider (m), sines (m).

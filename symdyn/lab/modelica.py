@@ -38,7 +38,7 @@ class Computed:
     """The variables of a parsed model on rows of states: each by its equation, when it is asked for.
 
     known   name -> values of states, inputs, the time, and of parameters that are not at their defaults
-    What needs a numeric algorithm is NaN.
+    Values that need a numeric algorithm are NaN.
     """
 
     def __init__(self, parsed: Any, known: Mapping[str, Any]) -> None:

@@ -7,7 +7,7 @@ Sources
   [3] OpenFAST regression tests, 5MW_ITIBarge_DLL_WTurb_WavesIrr: input files of ElastoDyn, ServoDyn and HydroDyn, and the summary
       that ElastoDyn writes of the masses
   [4] DNV-RP-C205: Environmental Conditions and Environmental Loads, appendix D
-What no source gives is marked "assumed". Undocumented moments of inertia are zero, as in [3].
+Values without a source are marked "assumed". Undocumented moments of inertia are zero, as in [3].
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ def test_arrays_on_the_device_are_read_and_written_there(host: HostDevice, order
     assert np.array_equal(made.to_numpy(), here)
     rows = np.from_dlpack(made)
     assert np.array_equal(rows, here) and rows.ctypes.data in host.blocks  # no copy
-    # What went up: t, the inputs, that there are none of, and the tables; what came back: codes.
+    # The uploads are t, the inputs, which there are none of, and the tables; codes came back.
     assert sum(n for what, n in host.log if what == "up") < 200 and [n for w, n in host.log if w == "down"] == [4 * N, 8 * 4 * N]
     out = np.zeros((N, 4), order=order)
     there = There(out)

@@ -1397,7 +1397,7 @@ SYMDYN_EXPORT int four_bar_reactions(const double *q, const double *u, const dou
     return four_bar_reactions_regular(q, u, p, c, out) ? four_bar_reactions_singular(q, u, p, c, out) : 0;
 }
 
-// What a return code means.
+// Meaning of a return code.
 SYMDYN_EXPORT const char *four_bar_reason(int code);
 SYMDYN_EXPORT const char *four_bar_reason(int code) {
     static const char *const reasons[] = {

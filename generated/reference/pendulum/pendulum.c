@@ -276,7 +276,7 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics(const double *q, const double *ud, c
     return 0;
 }
 
-// What a return code means.
+// Meaning of a return code.
 SYMDYN_EXPORT const char *pendulum_reason(int code);
 SYMDYN_EXPORT const char *pendulum_reason(int code) {
     static const char *const reasons[] = {

@@ -34,7 +34,7 @@ def run_held(module: Module, request: Request, part: Part, method: Any) -> Outco
 
     part     integrates a request whose inputs are not held
     method   the one that it integrates by
-    What a controller raises ends the run; ArgumentError where it returns what does not fit.
+    An error that a controller raises ends the run; ArgumentError where it returns what does not fit.
     """
     # With "gauss" first_step is the length of all steps.
     return _Pieces(module, request, part, method == "gauss", STEPS if is_compiled(method) else STEPS_OF_SCIPY).through()
