@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import io
 import re
@@ -35,9 +36,14 @@ def unwanted(style: str, title: str = "not") -> dict[str, str]:
     return {word: right for left, right in cells for word in left.split(", ")}
 
 
-def prose(path: Path) -> Iterator[tuple[int, str]]:
+@functools.cache
+def prose(path: Path) -> list[tuple[int, str]]:
     """Lines of text with their numbers: of a page without its code, of the changelog its newest section, of a notebook its
     markdown; of a module its docstrings, comments, messages and names of tests; of other files all."""
+    return list(_prose(path))
+
+
+def _prose(path: Path) -> Iterator[tuple[int, str]]:
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     if path.name == CHANGELOG.name:
@@ -96,8 +102,8 @@ def found(paths: list[Path], words: dict[str, str]) -> list[str]:
             for k, line in prose(path) for match in pattern.finditer(re.sub(r"`[^`]*`", "", line))]
 
 
-# Sentences that begin so have a clause for a subject, or their subject late.
-BEGINNINGS = re.compile(r"(What|Of|With which|Whoever)\b")
+# Sentences that begin so have a clause for a subject, or their subject late; questions may.
+BEGINNINGS = re.compile(r"(?:What|Whatever|Whoever|Which|Whichever|How|Of|That which|(?:With|By|On|At|To|For) (?:which|what))\b")
 SPLIT = re.compile(r"(?<=[.!?:])\s+(?=[A-Z`*\[])|\s*\|\s*")
 TWICE = re.compile(r"\b([a-z]+) \1\b")
 
@@ -129,7 +135,7 @@ def sentences(paragraph: str) -> list[str]:
 
 
 def begins_late(sentence: str) -> bool:
-    return BEGINNINGS.match(sentence) is not None and not sentence.endswith("?")
+    return BEGINNINGS.match(sentence) is not None and not re.match(r"[^.!?]*\?", sentence)
 
 
 def test_sentences_begin_with_their_subject() -> None:
@@ -144,37 +150,53 @@ def test_public_docstrings_begin_sentences_with_their_subject() -> None:
     assert [(name, one) for name, text in texts.items() for one in sentences(" ".join(text.split())) if begins_late(one)] == []
 
 
-def late_in_module(path: Path) -> list[str]:
-    """Sentences of the docstrings and comments of a module that begin with a clause in place of a subject."""
-    text = path.read_text(encoding="utf-8")
-    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)]
-    blocks = [(node.body[0].lineno, docstring) for node in nodes if (docstring := ast.get_docstring(node))]
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = [(*token.start, token.string.lstrip("# ")) for token in tokens if token.type == tokenize.COMMENT]
-    for k, (line, column, comment) in enumerate(comments):
-        if k and comments[k - 1][:2] == (line - 1, column):
-            blocks[-1] = (blocks[-1][0], f"{blocks[-1][1]} {comment}")
-        else:
-            blocks.append((line, comment))
-    return [f"{path.name}:{line}: {one[:60]}" for line, block in sorted(blocks) for one in sentences(" ".join(block.split()))
-            if begins_late(one)]
+# Marks of comments and of docstrings, behind which sentences begin; a sentence may also begin behind the end of another one.
+MARKS = re.compile(r"^.*?(?://+[/!<]*|/\*+|\{#-?|#:?|%|\"\"\"|^\s*[*-])\s*(?=[A-Z])")
+BEHIND = re.compile(r"(?:(?<=[.!?:]\s)|(?<=[.!?:]\s\s))(?=[A-Z])")
 
 
-@pytest.mark.parametrize("package", ["backend", "tape", "targets"])
-def test_modules_begin_sentences_with_their_subject(package: str) -> None:
-    assert [line for path in sorted((ROOT / "symdyn" / package).rglob("*.py")) for line in late_in_module(path)] == []
+def late(path: Path) -> list[str]:
+    """Sentences of a module, a template or a file of C that begin with a clause for a subject: at the beginning of a line,
+    of a comment or of a docstring, or behind another sentence."""
+    lines, result = prose(path), []
+    for index, (k, line) in enumerate(lines):
+        starts = {len(line) - len(line.lstrip()), *(match.end() for match in [MARKS.match(line)] if match),
+                  *(match.end() for match in BEHIND.finditer(line))}
+        behind = " ".join(text.strip(" #/*") for _, text in lines[index + 1:index + 4])
+        result += [f"{path.name}:{k}: {line[start:start + 60]}" for start in sorted(starts)
+                   if begins_late(f"{line[start:]} {behind}")]
+    return result
+
+
+ROOMS = sorted(path.name for path in (ROOT / "symdyn").iterdir() if any(path.rglob("*.py")))
+
+
+@pytest.mark.parametrize("folder", ROOMS)
+def test_modules_begin_sentences_with_their_subject(folder: str) -> None:
+    """In docstrings, comments and messages."""
+    assert [line for path in sorted((ROOT / "symdyn" / folder).rglob("*.py")) for line in late(path)] == []
+
+
+def test_other_texts_begin_sentences_with_their_subject() -> None:
+    """Those of modules outside of packages, of tests, of extensions of the site, of templates and C, and of the changelog."""
+    modules = [*(ROOT / "symdyn").glob("*.py"), *(ROOT / "tests").rglob("*.py"), *(ROOT / "docs").rglob("*.py")]
+    assert [line for path in [*sorted(modules), *TEMPLATES, CHANGELOG] if path != Path(__file__) for line in late(path)] == []
 
 
 def test_the_readme_of_templates_begins_sentences_with_their_subject() -> None:
     assert clumsy(ROOT / "templates" / "README.md") == []
 
 
-def test_a_late_subject_in_a_module_is_found(tmp_path: Path) -> None:
-    """In a docstring, and in a comment of several lines; not in a message, which is no sentence of its own."""
-    module = tmp_path / "module.py"
-    module.write_text('"""A mass. Of two the\nfirst is taken."""\n# It is\n# zero. What is left is\n# one.\nx = "What?"\n',
-                      encoding="utf-8")
-    assert late_in_module(module) == ["module.py:1: Of two the first is taken.", "module.py:3: What is left is one."]
+def test_a_late_subject_is_found(tmp_path: Path) -> None:
+    """In a docstring, a comment and a message of a module, in a comment of C; not in questions, code and within sentences."""
+    texts = {"module.py": '"""Mass. Of two the\nfirst."""\nWhat = 1  # What is left\nraise Error("none: What is zero is left")\n',
+             "asked.py": '"""What is it\nfor?"""\nprint("Which one? It tells what is left")  # of two\n',
+             "run.h": "// Rows. How many there are.\nint n;  // Whatever\n"}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert [line for name in texts for line in late(tmp_path / name)] == [
+        "module.py:1: Of two the", "module.py:3: What is left", "module.py:4: What is zero is left",
+        "run.h:1: How many there are.", "run.h:2: Whatever"]
 
 
 def test_a_clumsy_sentence_is_found(tmp_path: Path) -> None:
