@@ -171,7 +171,7 @@ def test_the_error_reports_which_states_fail() -> None:
 
 
 @pytest.mark.parametrize("bad", [{}, {(1, 3): np.inf}, {(5, 3): np.nan}])
-def test_modules_tell_the_first_row_that_fails(bad: Mapping[tuple[int, int], float]) -> None:
+def test_modules_report_the_first_row_that_fails(bad: Mapping[tuple[int, int], float]) -> None:
     """And why, as with C, whatever is wrong with the others."""
     x, told = turning(), []
     for place, value in bad.items():

@@ -214,7 +214,7 @@ def test_jumps_are_found_over_the_steps(name: str) -> None:
         assert any("gap moves a jump of the right-hand side, where -gap + x passes zero" in str(w.message) for w in found)
 
 
-def test_batches_and_ensembles_tell_of_jumps() -> None:
+def test_batches_and_ensembles_warn_of_jumps() -> None:
     """An event at the jump makes the derivatives those of differences, without a warning."""
     values, t, h = {"k": [5.0, 5.1]}, np.array([0, 3.0]), 1e-4
     by = ["k", "gap"]

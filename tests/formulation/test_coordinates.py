@@ -85,7 +85,7 @@ def test_spring_between_coinciding_points():
     (sp.gamma(q1), "load drive: gamma.q1. .* has no counterpart in generated code"),
     (sp.Piecewise((1, q1 > 0)), "load drive: .* not defined everywhere"),
 ])
-def test_unsupported_expressions_tell_where(expression, message):
+def test_unsupported_expressions_are_reported_with_their_place(expression, message):
     system = double(q2)
     system.add_joint_force("a", expression, name="drive")
     with pytest.raises(sd.UnsupportedExpression, match=message):

@@ -480,7 +480,7 @@ def test_no_gpu() -> None:
             ask()
 
 
-def test_all_that_a_kernel_does_not_do_is_said_at_once(host: HostDevice) -> None:
+def test_all_that_a_kernel_does_not_do_is_reported_at_once(host: HostDevice) -> None:
     module = compiled("double_pendulum")
     with pytest.raises(ArgumentError, match=r"does not take these motions: method='RK45'; kernels integrate by 'dop853' or "
                                             r"'bs54' or .*; max_steps, sensitivities: kernels have none of these\. Leave device"):

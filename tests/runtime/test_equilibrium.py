@@ -297,7 +297,7 @@ def test_forces_along_the_angles_do_not_balance_at_gimbal_lock() -> None:
     assert lock(straight) == "" and lock(straight.at(x=np.r_[straight.x[:4], -np.pi / 2, straight.x[5:]])) == "theta = -90 deg"
 
 
-def test_attitudes_tell_equilibria_apart_and_coordinates_have_ranges() -> None:
+def test_attitudes_distinguish_equilibria_and_coordinates_have_ranges() -> None:
     """A body on a spring, hanging or standing on its head."""
     module = hanging()
     found = module.equilibria([{"z": 0.5, "p0": 1.0}, {"z": 1.5, "p0": 0.0, "p1": 1.0}], fixed={"omega_z_free": 0.0})

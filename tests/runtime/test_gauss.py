@@ -235,7 +235,7 @@ def test_functions_of_the_user_are_rejected_with_their_own_reason() -> None:
         system.embedding().compile("c").simulate((0, 1), **GAUSS)
 
 
-def test_kinks_that_the_equations_do_not_tell_are_warned_of() -> None:
+def test_kinks_that_the_equations_do_not_show_are_warned_of() -> None:
     """By functions of the user: linear between points, a ramp that sets in, a stop, a jump; with steps chosen and given."""
     module = pushed()
     points = [0, 1, 1.7, 2.9, 5.05, 7.33, 20], [0, 1, 0.3, 0.5, -1, 0, 0.4]

@@ -68,7 +68,7 @@ def test_the_stabilized_index_2_form_reports_it() -> None:
         assert run.success and sum("ZYX angles of joint ball came within" in str(w.message) for w in caught) == n
 
 
-def test_many_motions_tell_it_at_the_states_that_are_kept(angles: Any) -> None:
+def test_many_motions_report_it_at_the_states_that_are_kept(angles: Any) -> None:
     """A quarter turn at 2 rad/s ends 1e-4/2 rad from gimbal lock: the second motion of three is kept there."""
     options = {"u": [[0.3, 0.2, 0.1], [0.0, 2.0, 1e-4], [0.0, 1.0, 0.1]], "rtol": 1e-9}
     with pytest.warns(sd.SimulationWarning, match=r"in 1 of 3 motions, the first of them 1, the ZYX angles of joint ball came "

@@ -247,7 +247,7 @@ def test_states_close_to_lost_rank_are_sought(crank: SystemUnderTest) -> None:
 # -- the rows
 
 
-def test_rows_tell_what_is_beyond_the_bound() -> None:
+def test_rows_report_what_is_beyond_the_bound() -> None:
     fine, wrong = Finding("rhs", -1.0, -1.0, beyond=-0.3, unknown=4), Finding("lam", -1.0, -1.0, beyond=0.2)
     row = next(first_order_row(Named, "C", [fine, Finding("energy", -1.0, -1.0)]))  # type: ignore[arg-type]
     assert (row.verdict, row.figure, row.bound) == (PASS, -0.3, 0.0)

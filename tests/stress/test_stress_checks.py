@@ -289,7 +289,7 @@ class Stopped:
     ({"message": "stopped at t = 0.5: gust"}, "no state"), ({"message": Stopped.message.replace("gust", "it")}, "does not name "
                                                             "gust"),
     ({"x": np.full((2, 2), math.nan)}, "not finite"), ({"t": np.array([0.0, 0.6])}, "too far")])
-def test_stops_must_tell_all(change: dict[str, Any], told: str) -> None:
+def test_stops_must_report_all(change: dict[str, Any], told: str) -> None:
     sol = type("Sol", (Stopped,), change)
     row = extremes.stopped("bad input", "cart", "gust", sol, 0.5, ("gust",))
     assert row.verdict == (FAIL if told else PASS) and told in row.why
@@ -347,7 +347,7 @@ def test_wrong_motions_past_singular_positions_are_found(wrong: Any, monkeypatch
     assert verdicts(others) == [FAIL]
 
 
-def test_stops_and_refusals_at_singular_positions_must_name_the_culprit() -> None:
+def test_stops_and_errors_at_singular_positions_must_name_the_culprit() -> None:
     class Lost(Stopped):
         message = "arm: stopped at t = 0.5: the rank falls to 1; the state there: q1 = 0"
 

@@ -107,7 +107,7 @@ def test_lean_articulated_bodies_give_the_same(seed: int, options: dict[str, boo
 
 
 @pytest.mark.parametrize(("seed", "options"), few_of(ALL))
-def test_joints_tell_the_same_velocity_product(seed: int, options: dict[str, bool]) -> None:
+def test_joints_give_the_same_velocity_product(seed: int, options: dict[str, bool]) -> None:
     """S_ring w by differentiating S, compared with the joint's own c: that is seen from the parent, and has omega x v more."""
     here, _ = drawn(seed, options)
     for link, S_ring in zip(here.tree.links, velocities(here.tree).S_ring, strict=True):
