@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 # Singular values of what forces along rows make along them, D = J M^-1 J^T, below this part of the largest, and pivots below this
-# part of the entries of the diagonal: rows that depend on each other. Of J itself see RANK in symdyn/tape/intrinsics.py.
+# part of the entries of the diagonal: rows that depend on each other. RANK in
+# symdyn/tape/intrinsics.py is for J itself.
 DEPENDENT = 1e-10
 
 # Events closer than this part of the span of the run happen at one time.

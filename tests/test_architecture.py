@@ -161,7 +161,7 @@ def test_names_in_c_have_the_words_of_the_field() -> None:
     assert wrong == set()
 
 
-# What each method of integration, or each kind of matrices, defines.
+# Functions that each method of integration, or each kind of matrices, defines.
 OF_METHODS = {"symdyn_try", "symdyn_between", "symdyn_begin", "symdyn_ahead", "symdyn_newton_matrix", "symdyn_newton_solve"}
 
 

@@ -1,4 +1,4 @@
-"""What benchmarks print, as a table: figures a line each, or columns two spaces apart."""
+"""Output of benchmarks as a table: figures a line each, or columns two spaces apart."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class NotSent(SymdynError):
 
 
 def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightSide]:
-    """What members with rigid contacts call, whichever modes they come to; options: of `simulate`."""
+    """Functions that members with rigid contacts call, whichever modes they come to; options: of `simulate`."""
     contacts, method = module.metadata.contacts, options.get("method", METHOD)
     if not contacts:
         return []
@@ -43,7 +43,7 @@ def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightS
 
 @dataclass(frozen=True)
 class _Provider:
-    """What gives a module its libraries, and where its derivative by x has entries."""
+    """Provider of a module's libraries, and of the indices of the entries of its derivative by x."""
 
     library: Callable[[str | RightSide], Library]
     given: Callable[[], Pattern | None]
@@ -88,7 +88,7 @@ class PortableModule:
         return zlib.compress(json.dumps(record).encode())
 
     def _pattern(self) -> list[Any] | None:
-        """Of many states whose derivative has few entries."""
+        """Indices of the entries of the derivative, for many states with few of them."""
         if self.module.metadata.sizes.x < LEAST_STATES:
             return None
         there = self.module.jacobian_indices()

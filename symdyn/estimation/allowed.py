@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from symdyn.estimation.measured_motion import Rows
     from symdyn.runtime.module import Module
 
-# What constraints of positions may lack, as a part of the mechanism's length: more is no error of a measurement.
+# Largest violation of constraints of positions, as a part of the mechanism's length: more is no error of a measurement.
 FAR = 0.05
 
 

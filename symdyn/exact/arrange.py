@@ -275,7 +275,7 @@ class Arranger:
                 merged.setdefault(_UNIT, ({}, {(): 1}))[0][row[0]] = p[row[0]]
                 continue
             number, common, q = stripped({parts[m][1]: p[m] for m in row})
-            # The common factor goes with the group; the rest tells which groups belong together.
+            # The common factor goes with the group; the rest shows which groups belong together.
             left, _ = merged.setdefault(frozenset(q.items()), ({}, q))
             left[multiplied(own, common)] = number
         return None if len(merged) == 1 or len(merged) == len(p) else list(merged.values())

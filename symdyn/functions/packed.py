@@ -15,7 +15,7 @@ from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Output, Tape, reachable
 
-# What was found of equations that are still in use: whether there is the function, its text and its reader each take it.
+# Results for equations that are still in use: the search for the function, its text and its reader each need them.
 _found: WeakKeyDictionary[Equations, Pattern | None] = WeakKeyDictionary()
 
 
@@ -69,7 +69,7 @@ def packed_tape(equations: Equations) -> Tape:
 
 
 def _leaves(equations: Equations) -> list[Any]:
-    """Of every state the leaf that stands for it; None where nothing depends on it."""
+    """Leaf that stands for every state; None where nothing depends on it."""
     symbols = equations.symbols
     known = {node.args[1]: node for node in reachable(equations.quantity("rhs").tolist()) if node.op == "leaf"}
     return [known.get(s.name) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]

@@ -264,7 +264,7 @@ def measure(bars: int) -> Row:
 
 
 def microseconds(rhs: Callable[[float, np.ndarray], np.ndarray], x: np.ndarray) -> float:
-    """Of the processor, one evaluation at a state: the least of 20 means of 100."""
+    """Processor time of one evaluation at a state: the least of 20 means of 100."""
     times = []
     for _ in range(20):
         begun = clock.process_time()

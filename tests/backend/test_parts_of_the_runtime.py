@@ -66,7 +66,7 @@ ROOTS = ("runtime.c", "batch_explicit.h", "motions.h", "states.h", "rows.h", "si
 
 
 def test_comments_of_written_files_name_no_other_files() -> None:
-    """Whoever has a written file has none of symdyn's."""
+    """Readers of a written file have none of symdyn's."""
     texts: dict[str, str] = {}
     names = list(ROOTS)
     while names:

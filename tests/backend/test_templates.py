@@ -129,7 +129,7 @@ def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Pa
 
 
 def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
-    """What a shipped template includes is looked for in the user's folder first, too."""
+    """Includes of a shipped template are looked for in the user's folder first, too."""
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / "simulate.c.jinja").write_text("// no integrator for {{ model.name }}\n")
     text = emit(derived("pendulum"), "c", templates=tmp_path).files["pendulum.c"]
@@ -233,7 +233,7 @@ def test_broken_dialect(old: str, new: str, message: str, derived: Callable[...,
 
 
 def members(record: type) -> set[str]:
-    """What templates may read: fields, properties and methods."""
+    """Names that templates may read: fields, properties and methods."""
     own = {name for name, value in vars(record).items() if isinstance(value, property) or callable(value)}
     return {name for name in own | {f.name for f in dataclasses.fields(record)} if not name.startswith("_")}
 
@@ -251,7 +251,7 @@ def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
 
 @pytest.fixture
 def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
-    """What the templates of a module in C, an FMU, a Modelica model and the page of a firmware package get."""
+    """Records that the templates of a module in C, an FMU, a Modelica model and the page of a firmware package get."""
     seen: dict[type, NamedRecords] = {}
 
     def spy(self: NamedRecords) -> dict[str, Any]:
@@ -271,9 +271,9 @@ def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRec
 
 
 @pytest.mark.parametrize(("heading", "record"), [
-    ("What a template gets", Context), ("What the templates of an FMU get", FmuContext),
-    ("What the templates of a Modelica model get", ModelicaContext),
-    ("What the page of a firmware package gets", PackageContext)])
+    ("Context of a template", Context), ("Context of the templates of an FMU", FmuContext),
+    ("Context of the templates of a Modelica model", ModelicaContext),
+    ("Context of the page of a firmware package", PackageContext)])
 def test_readme_lists_what_templates_get(heading: str, record: type, contexts: dict[type, NamedRecords]) -> None:
     assert listed(f"## {heading}\n") == set(contexts[record].names())
 

@@ -31,7 +31,7 @@ from printed import as_table
 
 from tests.checks.commits import ROOT, tree_of
 
-# What is compared: (row, column) -> the cell, as text.
+# Cells that are compared: (row, column) -> the cell, as text.
 Cells = dict[tuple[str, str], str]
 NUMBER = re.compile(r"(-?(?:\d[\d.,]*(?:e[-+]?\d+)?|inf|nan))(?: (.*))?")
 WHOLE = ("the whole run", "processor s")
@@ -80,7 +80,7 @@ def _numbered(found: Iterable[tuple[tuple[str, str], str]]) -> Cells:
 
 
 def run(root: Path, words: Sequence[str]) -> Cells:
-    """What `symdyn bench` prints in a tree, and its processor time. Raises RuntimeError where it fails."""
+    """Output of `symdyn bench` in a tree, and its processor time. Raises RuntimeError where it fails."""
     with tempfile.TemporaryDirectory() as made:
         known = {"OPENBLAS_NUM_THREADS": "1", **os.environ, "PYTHONPATH": str(root), "SYMDYN_CACHE_DIR": made}
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -103,7 +103,7 @@ def test_as_many_steps_and_evaluations_as_without() -> None:
 
 @pytest.mark.parametrize("method", ["dop853", "DOP853", "RK45"])
 def test_corrections_are_what_they_change(method: str) -> None:
-    """Of one step, against the same step without them."""
+    """Corrections of one step, compared with the same step without them."""
     pendulum = module("pendulum_absolute")
     n_q = pendulum.metadata.sizes.q
     free, kept = (pendulum.simulate(np.array([0, 0.5]), rtol=0.1, atol=0.1, first_step=0.5, method=method, stabilization=s)

@@ -78,9 +78,8 @@ static inline int symdyn_all_finite(const double *values, int n) {
 #define SYMDYN_SLOPE_AT_END 0
 #define SYMDYN_SECOND_ERROR 1
 
-// The problem of a run, and its inputs at a time.
-
 // Arguments of the right-hand side in addition to t and x.
+
 #ifndef SYMDYN_PROBLEM_TYPE
 #define SYMDYN_PROBLEM_TYPE
 
@@ -98,6 +97,8 @@ typedef struct {
 } symdyn_problem;
 
 #endif
+
+// The problem of a run, and its inputs at a time.
 
 enum { SYMDYN_INPUT_STOPPED = 100000 };
 
@@ -172,10 +173,7 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
     }
 }
 
-// Multipliers of least norm; see Multipliers in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes of
-// all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
-
-// Factors of symmetric matrices: shared by symdyn_saddle.h and symdyn_multipliers.h.
+// Factors of symmetric matrices.
 
 // start - a_0 x_0 - ... - a_(n - 1) x_(n - 1), where the a are `step` numbers apart.
 static inline double symdyn_less(double start, int n, const double *a, int step, const double *x) {
@@ -242,6 +240,9 @@ static void symdyn_substitute(int n, int row, const symdyn_span *envelope, const
     }
 }
 
+// Multipliers of least norm. The largest sizes of all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with
+// SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
+
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
 // in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = SYMDYN_SMOOTHED.
 SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam) {
@@ -289,8 +290,8 @@ SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam
     return 0;
 }
 
-// The iterated augmented Lagrangian; see Saddle in symdyn/tape/intrinsics.py, which has the numbers SYMDYN_...; the largest sizes
-// of all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with SYMDYN_SADDLE_ONE_SIZE those of each.
+// The iterated augmented Lagrangian. The largest sizes of all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with
+// SYMDYN_SADDLE_ONE_SIZE those of each.
 
 // Whether a pivot of the symmetric A, which is used up, is next to nothing of its entry: nothing holds some direction then.
 // The pivot that is the largest part of its entry goes first, so that rounding stays small.
@@ -1512,9 +1513,6 @@ SYMDYN_LINKED int symdyn_field(const symdyn_problem *problem, double t, const do
 // Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
 // error estimate, p. 254). The coefficients are those of the authors' code DOP853.
 
-// Declarations of all parts of the integrator of one mechanism. SYMDYN_MODEL: its sizes, tables and the functions that are
-// integrated.
-
 // Coefficients of the method: numbers of stages, of slopes, of rows of the dense output; times and slopes of stages.
 #define SYMDYN_STAGES 12
 #define SYMDYN_SLOPES 16
@@ -1585,10 +1583,8 @@ typedef struct {
     int rough;                              // whether it is not good enough
 } symdyn_method;
 
-// A run of the integrator: its memory, failures, the right-hand side, norms. Nothing is allocated or global: a run lives in one
-// struct, and one that was interrupted continues to the same bits.
-
 // Report of a run.
+
 #ifndef SYMDYN_REPORT_TYPE
 #define SYMDYN_REPORT_TYPE
 
@@ -1615,6 +1611,7 @@ typedef struct {
 #endif
 
 // Statuses of a run.
+
 #ifndef SYMDYN_STATUS
 #define SYMDYN_STATUS
 
@@ -1644,6 +1641,9 @@ enum {
 // The type of times, which stay doubles where all else is in single precision.
 
 typedef double symdyn_time;
+
+// A run of the integrator: its memory, failures, the right-hand side, norms. Nothing is allocated or global: a run lives in one
+// struct, and one that was interrupted continues to the same bits.
 
 typedef struct {
     symdyn_problem problem;
@@ -1767,7 +1767,7 @@ SYMDYN_LINKED int symdyn_try(
     return 0;
 }
 
-// See explicit_again.h.
+// Across singular configurations, and where the polynomial is not good enough, steps of their own take its place.
 SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, symdyn_time s, double *x_out, double *err);
 SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run);
 
@@ -1813,10 +1813,8 @@ SYMDYN_LINKED int symdyn_between(symdyn_run *run, symdyn_time s, double *x_out) 
     return 0;
 }
 
-// The parts of the integrator of one mechanism, in order.
-
-// Functions of the integrator that others call: see start.h, simulate.h and events.h. A run is memory of simulation_size bytes,
-// on a multiple of 64.
+// Functions of the integrator that others call, explained where they are defined. A run is memory of simulation_size bytes, on a
+// multiple of 64.
 
 SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void);
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(

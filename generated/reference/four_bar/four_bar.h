@@ -128,6 +128,7 @@ int four_bar_lam_rows(four_bar_frame *frame);
 int four_bar_reactions_rows(four_bar_frame *frame);
 
 // Arguments of the right-hand side in addition to t and x.
+
 #ifndef SYMDYN_PROBLEM_TYPE
 #define SYMDYN_PROBLEM_TYPE
 
@@ -147,10 +148,12 @@ typedef struct {
 #endif
 
 // Statuses of a run as text.
+
 #ifndef SYMDYN_STATUS_TEXT
 #define SYMDYN_STATUS_TEXT
 
 // Statuses of a run.
+
 #ifndef SYMDYN_STATUS
 #define SYMDYN_STATUS
 
@@ -219,6 +222,7 @@ static inline const char *symdyn_status_text(int status) {
 #endif
 
 // Report of a run.
+
 #ifndef SYMDYN_REPORT_TYPE
 #define SYMDYN_REPORT_TYPE
 

@@ -100,6 +100,7 @@ int pendulum_energy_rows(pendulum_frame *frame);
 int pendulum_inverse_dynamics_rows(pendulum_frame *frame);
 
 // Arguments of the right-hand side in addition to t and x.
+
 #ifndef SYMDYN_PROBLEM_TYPE
 #define SYMDYN_PROBLEM_TYPE
 
@@ -119,10 +120,12 @@ typedef struct {
 #endif
 
 // Statuses of a run as text.
+
 #ifndef SYMDYN_STATUS_TEXT
 #define SYMDYN_STATUS_TEXT
 
 // Statuses of a run.
+
 #ifndef SYMDYN_STATUS
 #define SYMDYN_STATUS
 
@@ -191,6 +194,7 @@ static inline const char *symdyn_status_text(int status) {
 #endif
 
 // Report of a run.
+
 #ifndef SYMDYN_REPORT_TYPE
 #define SYMDYN_REPORT_TYPE
 

@@ -215,7 +215,7 @@ def _bits(bits: int) -> Iterator[int]:
 
 
 def _turned(rows: Sequence[int], n: int) -> list[int]:
-    """Of a matrix with n columns, rows as sets of columns, the columns as sets of rows."""
+    """Columns of a matrix as sets of rows, from its rows as sets of n columns."""
     columns = [0] * n
     for k, row in enumerate(rows):
         for column in _bits(row):

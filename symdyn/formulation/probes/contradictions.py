@@ -161,7 +161,7 @@ def _combinations(A: Sampled) -> Iterator[tuple[int, list[tuple[int, float]]]]:
 
 
 def _factors(gradient: np.ndarray, others: Sequence[np.ndarray]) -> list[tuple[int, float]] | None:
-    """Of the others those that the gradient is a combination of, with their factors; None if it is none."""
+    """The others whose combination the gradient is, with their factors; None if it is none."""
     A = np.array([g / np.linalg.norm(g) for g in others]).T
     factors = np.linalg.lstsq(A, gradient, rcond=1e-12)[0]
     if np.linalg.norm(A @ factors - gradient) > TOLERANCE * np.linalg.norm(gradient):

@@ -3,7 +3,7 @@
 // On a panel, a part of a step, a quantity is known by samples at Chebyshev nodes and one more for a check: it has no zero where
 // the mean of the polynomial through them is larger than all its other coefficients and its error, and at most one where that
 // holds for its derivative. The error is SYMDYN_PANEL_TAIL times the last two coefficients and SYMDYN_PANEL_CHECK times what the
-// polynomial is off at the check. What is between samples is bounded by interval arithmetic, where a quantity has bounds.
+// polynomial is off at the check. Values between samples are bounded by interval arithmetic, where a quantity has bounds.
 // Panels on which this says nothing are halved. Source: Trefethen, Approximation Theory and Approximation Practice, 2013; Boyd,
 // SIAM J. Numer. Anal. 40 (2002), 1666.
 #pragma once
