@@ -94,8 +94,8 @@ class Shape:
 
 
 def most_events(n: int) -> int:
-    """Number of events that may wait, of n kinds: at the next time after WAITING - 1 all kinds may happen, and once in a run each kind
-    is noted as not resolved and as not proved, and one as depending on the order."""
+    """Number of events of n kinds that may wait: at the next time after WAITING - 1 all kinds may happen, and once in a run
+    each kind is noted as not resolved and as not proved, and one as depending on the order."""
     return WAITING + 3 * n
 
 
