@@ -19,6 +19,7 @@ from symdyn.exact.prove import decide
 from symdyn.formulation.algebra import TapeAlgebra, given_by_time
 from symdyn.formulation.by_hand.matrices import GivenMatrices, Recorded, at_random_states
 from symdyn.formulation.constraints.null_space import elimination_order
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.square_systems import SquareSystem
 from symdyn.model.symbols import Speed
@@ -26,7 +27,7 @@ from symdyn.spatial.vectors import congruence, vector, zeros
 from symdyn.sympy_mechanics.border import given_matrices
 from symdyn.sympy_mechanics.options import Options
 from symdyn.tape.differentiate import forward, jacobian
-from symdyn.tape.node import SPEED, Node, is_zero
+from symdyn.tape.node import SPEED, Node
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable
 
@@ -111,7 +112,7 @@ class _Both:
         if N.shape[0] == n:
             return list(range(n))
         sample = at_random_states(algebra, self.equations.symbols, 1, N=N)["N"][0]
-        order = elimination_order(sample.T, np.array([[not is_zero(e) for e in row] for row in N.T], dtype=bool))
+        order = elimination_order(Sampled.of(sample.T[np.newaxis]))
         return None if order is None or len(order) < n else sorted(column for _, column in order)
 
     def in_u(self, values: np.ndarray) -> np.ndarray:

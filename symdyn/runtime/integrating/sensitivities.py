@@ -203,7 +203,8 @@ def _moving_jumps(module: Module, request: Request, outcome: Outcome, names: Seq
         rows = np.flatnonzero(signs[1:, k] * signs[:-1, k] <= 0)
         if len(rows):
             J = module.jacobian(t[rows], x[rows], request.p, inputs[rows], ["params", "inputs"], "switches")
-            by = np.concatenate([np.asarray(J.params)[:, k], np.asarray(J.inputs)[:, k]], axis=1).any(axis=0)
+            slopes = np.concatenate([np.asarray(J.params)[:, k], np.asarray(J.inputs)[:, k]], axis=1)
+            by = (slopes != 0).any(axis=0)
             known = dict(zip((*metadata.parameters, *metadata.inputs), by.tolist(), strict=True))
             result |= {name: jump.surface for name in asked if known[name] and name not in result}
     return result

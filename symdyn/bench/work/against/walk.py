@@ -18,8 +18,8 @@ from symdyn.tape.walk import walk as tape_walk
 # Functions with the same name in other programs and on the tape.
 ELEMENTARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
               "exp", "log", "erf")
-ARITHMETIC = {"add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg,
-              "pow": operator.pow}
+ARITHMETIC: dict[str, Callable[..., Any]] = {"add": operator.add, "sub": operator.sub, "mul": operator.mul,
+                                             "div": operator.truediv, "neg": operator.neg, "pow": operator.pow}
 
 
 def right_hand_side(equations: Any, params: np.ndarray, state: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]],
