@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 # Cases that are followed; a mechanism of n links has 2^n positions of rest.
 CASES = 4096
-# Digits of numbers that tell whether equations are fulfilled.
+# Digits of numbers that show whether equations are fulfilled.
 DIGITS = 30
 # Numbers of 30 digits below this are zero; those of expressions at numbers for parameters, which may cancel.
 ZERO, NEAR = 1e-20, 1e-12

@@ -34,7 +34,7 @@ def options() -> list[str]:
 
 
 class Generator:
-    """The library. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+    """The library. Raises MissingExtra, CompilerNotFound or CompileError, whose messages name what to install."""
 
     def __init__(self) -> None:
         text = "#include <pinocchio/autodiff/casadi.hpp>\n" + sources("model.hpp", "casadi_aba.cpp")

@@ -23,7 +23,7 @@ def generate(arguments: argparse.Namespace) -> int:
 
 def write_files(equations: MotionEquations, backends: Sequence[str], output: Path | None,
                 functions: Sequence[str] | None = None, templates: str | None = None) -> Path:
-    """Write and tell; returns the folder."""
+    """Write and report; returns the folder."""
     from symdyn.pipeline import emit, write_source
 
     operations: Mapping[str, int] = {}
@@ -34,6 +34,6 @@ def write_files(equations: MotionEquations, backends: Sequence[str], output: Pat
             print(f"wrote {path}")
         operations = source.metadata.operations
     print("operations: " + ", ".join(f"{name} {count}" for name, count in operations.items()))
-    print("No compiler was needed; the first lines of main.c tell how to build." if "c" in backends else
+    print("No compiler was needed; the first lines of main.c explain how to build." if "c" in backends else
           "No compiler was needed.")
     return folder

@@ -148,7 +148,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
                        ("--input", "constant inputs, such as F=1")):
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
     parser.add_argument("--consistent", action="store_true", help="begin with the nearest state that fulfils the constraints, "
-                        "and tell what it changes")
+                        "and report what it changes")
     parser.add_argument("--keep", metavar="NAME", nargs="+", action="extend", default=[], help="coordinates and speeds that "
                         "--consistent leaves as they are given")
     parser.add_argument("--stabilization", metavar="WAY", type=stabilization, help="what keeps constraints: projection, "

@@ -15,7 +15,7 @@ FILM_SECONDS = 20.0
 
 
 def save(solution: Solution, folder: Path, picture: bool, film: bool) -> None:
-    """Write data and pictures, and tell; without matplotlib there are data only."""
+    """Write data and pictures, and report them; without matplotlib there are data only."""
     stem = folder / solution.module.name
     for ending in (".npz", ".csv"):
         print(f"wrote {solution.save(stem.with_name(stem.name + ending))}")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def simulate(arguments: argparse.Namespace) -> int:
-    """Simulate, tell, save; what was computed until an early stop is kept."""
+    """Simulate, report, save; what was computed until an early stop is kept."""
     from symdyn.errors import EvaluationError, SimulationInterrupted, SimulationWarning
     from symdyn.runtime.consistent import NotConsistent
 

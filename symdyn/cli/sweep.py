@@ -29,7 +29,7 @@ SUMMARIZED = 100_000
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """Read the file, simulate here or on a cluster, tell, draw."""
+    """Read the file, simulate here or on a cluster, report, draw."""
     from symdyn.cli import sweep_on_cluster
     from symdyn.ensembles.claims import LEASE
     from symdyn.ensembles.exports import demand_formats

@@ -292,7 +292,7 @@ class Case:
         return result
 
     def _placed(self, formula: Formula) -> Formula:
-        """With its slide, and with functions whose errors tell the formula."""
+        """With its slide, and with functions whose errors name the formula."""
         slide = formula.slide or self.slide or Slide("")
         if formula.line is not None:
             slide = replace(slide, line=formula.line)

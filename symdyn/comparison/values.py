@@ -131,7 +131,7 @@ def _equation(left: Any, right: Any, what: str, faults: list[str]) -> Value | No
 
 
 def canonical(*groups: Iterable[sp.Expr]) -> dict[sp.Symbol, sp.Symbol]:
-    """Symbols of the same name -> one real symbol, positive if one of them is: slides do not tell assumptions."""
+    """Symbols of the same name -> one real symbol, positive if one of them is: slides do not state assumptions."""
     symbols = sorted({s for group in groups for e in group for s in symbols_of(e)}, key=lambda s: (s.name, str(type(s))))
     positive = {s.name for s in symbols if s.is_positive}
     return {s: sp.Symbol(s.name, positive=True) if s.name in positive else sp.Symbol(s.name, real=True) for s in symbols}

@@ -113,7 +113,7 @@ class _Examination:
         return _Numbers(values, tuple(p.name for p in symbols.parameters if p.name not in known))
 
     def _owners(self) -> list[str]:
-        """For every row the loop or constraint that it belongs to."""
+        """Loop or constraint that every row belongs to."""
         owners = list(self.names)
         for closure in self.gathered.closures:
             for index in closure.indices:

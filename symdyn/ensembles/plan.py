@@ -39,7 +39,7 @@ MOST_CHUNKS, CHUNK_BYTES = 10_000, 2**26
 TRIED = 8
 # Name in results by a GPU, whatever its number on a machine: several of them may share a folder.
 GPU = "gpu"
-# From so many samples on it is worth compiling code that integrates several motions at once.
+# Number of samples from which on code that integrates several motions at once is worth compiling.
 VECTORS_FROM = 2000
 
 

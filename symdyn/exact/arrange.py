@@ -324,7 +324,7 @@ class Arranger:
         if parts is not None:
             return self.times(1, (), [(self.nested(f), n) for f, n in parts])
         groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
-        # Terms that are left to arrange tell which of them are worth it.
+        # Terms that are left to arrange show which of them are worth it.
         left = [_left(g) for g in groups]
         if len(q) > ALL and groups:
             groups = [groups[left.index(min(left))]] if min(left) < len(q) else []

@@ -350,7 +350,7 @@ class _Lookup(dict[int, Letter]):
 
     def __init__(self, writer: Writer) -> None:
         super().__init__()
-        # Not a cycle, so that all that a quantity took goes once it is written: the collector takes longer to find it.
+        # There is no cycle, so that all that a quantity took goes once it is written: the collector takes longer to find it.
         self.writer: Writer = weakref.proxy(writer)
 
     def __missing__(self, k: int) -> Letter:

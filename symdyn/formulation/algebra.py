@@ -49,13 +49,13 @@ class TapeAlgebra:
         return self.recorder.guard(value, value - least, reason)
 
     def expression(self, e: Any) -> Any:
-        """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""
+        """A SymPy expression on the tape. Raises UnsupportedExpression, which names the part of the model where it stands."""
         known = self._memory.get(e)
         if known is not None:
             return known
         quantities = [q for q in quantities_in([e]) if q not in self.leaves and q not in self._memory]
         if quantities and self.measured is not None:
-            # Not among the leaves: these are printed under the names of their symbols.
+            # They stay out of the leaves, which are printed under the names of their symbols.
             self._memory.update({q: self.measured(q) for q in quantities})
         try:
             return record_expression(self.recorder, e, self.leaves, self._memory)

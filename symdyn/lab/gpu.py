@@ -23,7 +23,7 @@ from symdyn.runtime.module import Module
 
 ARCHITECTURE = "sm_90"
 COUNT = 1_000_000
-# So many motions are integrated on the processor, too: for the time of one, and to be compared with.
+# Number of motions integrated on the processor, too: for the time of one, and to be compared with.
 COMPARED = 2_000
 TOLERANCE = 1e-8
 # Threads that an H200 can hold: of each multiprocessor, and their number. For all of them the driver sets stacks aside.

@@ -116,7 +116,7 @@ def resultants() -> list[Formula]:
     newton = r"\mathbf F_{{G_{0}}}", r"\mathbf M_{{G_{0}}}"
     given = sp.Matrix([a.equations.symbols.coordinates[1]])
     turned = Erratum(
-        "Given is theta_b2/b1, the angle of link 2 against link 1; with the indices exchanged it has the other sign.",
+        "The given angle is theta_b2/b1, of link 2 against link 1; with the indices exchanged it has the other sign.",
         Proof("rotation", "turning about z by it must take b2- to b1-components",
               lambda angle: sd.rotation.about("Z", sp.Matrix(angle)[0]) - a.b2.rotation(a.b1)))
     return [

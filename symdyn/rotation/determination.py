@@ -125,7 +125,7 @@ def to_euler(R: Matrix, sequence: str) -> EulerSolutions:
     Numbers may have leading axes. Locked is what is nearer to lock than 1e-15 rad, or than twice the largest entry of
     |R^T R - 1|: below, R does not tell the first and third angle apart. All solutions give R back to its own accuracy.
     Expressions give atan2 of the entries, exact for exact numbers. With symbols R is taken to be a rotation, and the angles
-    hold for all real values of the symbols but those at lock; it is locked if the entries that tell the angles apart are zero
+    hold for all real values of the symbols but those at lock; it is locked if the entries that distinguish the angles are zero
     for all values of the symbols, which is decided at two points of them to 25 digits.
 
     Raises NotARotation if |R^T R - 1| of numbers has an entry above 1e-9, det R < 0, or R is not (3, 3); ArgumentError for

@@ -49,7 +49,7 @@ def angular_velocity(R: Matrix, frame: str = "n", *, R_dot: Matrix | None = None
     elif isinstance(algebra, Expressions):
         R_dot = R.applyfunc(_rate)
     else:
-        raise ArgumentError("R is of numbers and does not tell how it changes; pass its derivative too: R_dot=")
+        raise ArgumentError("R is of numbers and does not show how it changes; pass its derivative too: R_dot=")
     S = R_dot @ algebra.transposed(R) if in_n else algebra.transposed(R) @ R_dot
     rows = algebra.entries(S)
     if not isinstance(algebra, Expressions):

@@ -105,7 +105,7 @@ def first_order_row(tested: SystemUnderTest, label: str, result: Sequence[Findin
 
 
 def set_aside(tested: SystemUnderTest, result: Sequence[Finding]) -> Iterator[Row]:
-    """Rows of states at which the condition does not tell what digits are lost: what is, and whether rounding explains it."""
+    """Rows of states at which the condition does not show what digits are lost: what is, and whether rounding explains it."""
     if any(f.near.states or f.near.beyond > 0 or f.near.imbalance > 0 for f in result):
         yield _aside(tested, "lost rank", [(f.name, f.near) for f in result],
                      "which lie next to a position where constraints lose rank", "the exact multipliers and accelerations grow "

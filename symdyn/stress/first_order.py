@@ -156,5 +156,5 @@ def _times(bar: np.ndarray, slope: Any) -> np.ndarray:
 
 
 def _of_number(value: Any) -> float:
-    """By how much the double is off that stands for a number."""
+    """Error of the double that stands for a number."""
     return 0.0 if isinstance(value, bool) or Fraction(float(value)) == value else EPS * abs(float(value))

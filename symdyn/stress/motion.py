@@ -37,7 +37,7 @@ def energy_row(tested: SystemUnderTest, motion: Path, check: str = "energy", of:
     Raises NotApplicable where there is none, MotionStops where a motion at other times stops early.
     """
     if not tested.has("energy"):
-        raise NotApplicable("the equations tell no energy")
+        raise NotApplicable("the equations give no energy")
     conservative = bool(tested.module.metadata.conservative)
     end = float(motion.sol.t[-1])
     sol = tested.run(np.linspace(0.0, end, 401), rtol=RTOL, atol=RTOL * motion.scales, work=not conservative)

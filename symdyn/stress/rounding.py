@@ -35,7 +35,7 @@ from symdyn.stress.statements import Statements, emitted
 from symdyn.stress.system_under_test import EPS, SystemUnderTest, evaluated
 from symdyn.turning import in_radians
 
-# Not looked at: what is no number of the state's own.
+# Functions that are not checked, as they are no numbers of the state's own.
 LEFT_OUT = ("length", "C_scale")
 # Quantities that are zero on the constraints are evaluated off them, too: at this distance, of the usual size.
 NEARBY, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3

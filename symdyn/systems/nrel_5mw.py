@@ -34,7 +34,7 @@ BALLAST_WAY = 30.0  # m, assumed: between the middles of tanks at opposite sides
 HULL_CENTER = 1.0  # m, height of the hull's middle above O: from -4 m to 6 m
 
 # -- tower: the land-based one of [1], 87.6 m high, on the barge. Its foot is at O, in the water plane [3: TowerBsHt = 0], so that
-# the hub is 90 m above the water. The masses tell that it is this tower: 5,452,000 + 347,460.232 + 350,000.245 is the total of
+# the hub is 90 m above the water. The masses show that it is this tower: 5,452,000 + 347,460.232 + 350,000.245 is the total of
 # 6,149,460.477 kg in [3].
 
 TOWER_HEIGHT = 87.6  # m

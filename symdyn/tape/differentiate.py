@@ -46,7 +46,7 @@ def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any
 
 
 def direction(recorder: Recorder, leaves: Sequence[Node]) -> dict[Node, Node]:
-    """For each leaf one that stands for its entry in a direction: seeds of `forward`."""
+    """Leaves that stand for the entries of leaves in a direction: seeds of `forward`."""
     return {leaf: recorder.leaf(seed_name(leaf.args[1]), SEED) for leaf in leaves}
 
 

@@ -118,7 +118,7 @@ class UserFunction(Intrinsic):
 
     @cached_property
     def functions(self) -> tuple[type[Result], ...]:
-        """For each result the SymPy function that stands for it."""
+        """SymPy functions that stand for the results."""
         many = self.results > 1
         return tuple(FunctionClass(f"{self.label}_{k + 1}" if many else self.label, (Result,),
                                    {"nargs": len(self.arguments), "intrinsic": self, "index": k})

@@ -91,7 +91,7 @@ class Intrinsic:
 
     def by_others(self, k: int) -> tuple[int, list[tuple[int, int]]] | None:
         """Formula of result k from others: divisor d and pairs (i, j) with results[k] values[d] = -sum(values[i] results[j]);
-        None where it does not. By repeated use all results are reached that do not follow."""
+        None where it does not. Repeated use reaches all results that do not follow."""
         return None
 
 

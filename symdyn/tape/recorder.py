@@ -50,7 +50,7 @@ class Recorder:
     names    node -> the name of the quantity it is, given while deriving
     checks   node -> reason: values that must be positive, such as pivots of the mass matrix
     slopes   node -> pairs (derivative, by which value): derivatives that are known to be shorter than those by the chain rule,
-             which the steps do not tell, such as those of the potential of what is at rest; for proofs
+             which the steps do not show, such as those of the potential of what is at rest; for proofs
     balanced   the outputs that were balanced last, and the tape that they became, see symdyn.tape.balance
     """
 

@@ -18,7 +18,7 @@ _ROUNDING = 1e-15
 
 
 def demand_inertia(robot: Robot, order: list[UrdfJoint], moving: dict[str, str], faults: FileFaults) -> None:
-    """Tell of inertias that no body can have, and of moving leaves without inertia along their joint.
+    """Report inertias that no body can have, and of moving leaves without inertia along their joint.
 
     moving   joint -> the joint whose coordinate moves it; those that are not in it are fixed
     """

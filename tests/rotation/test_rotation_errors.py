@@ -113,7 +113,7 @@ NEAR = np.pi / 2 - 3e-9
     (lambda: rotation.vee(np.eye(3)), sd.ArgumentError, ["not skew-symmetric", "|S + S^T| is 2", "(S - S^T) / 2"]),
     (lambda: rotation.vee(sp.eye(3)), sd.ArgumentError, ["not skew-symmetric"]),
     (lambda: rotation.infinitesimal([np.nan, 0, 0]), sd.ArgumentError, ["the small rotation: the value nan"]),
-    (lambda: rotation.angular_velocity(np.eye(3)), sd.ArgumentError, ["does not tell how it changes", "R_dot="]),
+    (lambda: rotation.angular_velocity(np.eye(3)), sd.ArgumentError, ["does not show how it changes", "R_dot="]),
     (lambda: rotation.angular_velocity(np.eye(3), R_dot=np.eye(3)), sd.ArgumentError,
      ["not skew-symmetric", "is 2 ", "check R_dot"]),
     (lambda: rotation.angular_velocity(rotation.about("Z", sd.coordinates("q").ddot)), sd.ArgumentError, ["depends on q_ddot"]),

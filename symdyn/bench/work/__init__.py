@@ -51,7 +51,7 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    a later run
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s; runs that end there are timed alone
-    per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and tell the least time below an error more
+    per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and determine the least time below an error more
                    sharply
 
     Raises ArgumentError that lists everything that is wrong with what is asked for; SymdynError if nothing can be measured.

@@ -45,7 +45,7 @@ class Carried:
     def of(cls, data: Mapping[str, Any], mark: str = "", timed: str = "") -> Carried:
         """From plain data of a benchmark: what it carries, and its own rows. Raises one of DAMAGED.
 
-        mark    fingerprint of this run;  timed: of rows that do not tell
+        mark    fingerprint of this run;  timed: of rows without one
         """
         rows = {m: {row.key: row for row in map(Row.of, records)} for m, records in data["carried"].items()}
         own = [replace(row, earlier=row.earlier or timed) for row in map(Row.of, data["rows"])]

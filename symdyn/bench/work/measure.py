@@ -130,7 +130,7 @@ def _energy_error(formulation: Formulation, sol: Any, given: dict[str, Any]) -> 
         if not formulation.module.metadata.conservative:
             sol = formulation.module.simulate(sol.t, **given, work=True)
         return float(sol.energy_error())
-    except ArgumentError:  # equations by hand, which do not tell the energy
+    except ArgumentError:  # equations by hand, which do not give the energy
         return NAN
 
 

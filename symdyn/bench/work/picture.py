@@ -110,7 +110,7 @@ def _drawn(row: Row, index: int | None, value: Callable[[Row, int | None], float
 
 
 def _legend(figure: Any, rows: Sequence[Row], styles: dict[str, Any]) -> None:
-    """Colours tell methods, markers and kinds of line formulations; other programs have lines of their own."""
+    """Colours show methods, markers and kinds of line formulations; other programs have lines of their own."""
     from matplotlib.lines import Line2D
 
     def entry(label: str, **style: Any) -> Any:

@@ -24,7 +24,7 @@ class Row:
     formulation, method   names as they are asked for; peer: the method is another program's
     tolerance, step       relative and absolute tolerance of a step, or its length, s; the other is None
     seconds               inside the integrator, median of `repeats` runs; least: the shortest of them
-    evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not tell
+    evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not report it
     operations            evaluations times the operations of the right-hand side's tape; 0 of peers, and of taylor, whose
                           evaluations are orders of series
     error                 at the end, norm-wise relative: the larger of error_q and error_u (see `system_under_test.Comparison`)

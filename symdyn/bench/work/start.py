@@ -17,7 +17,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.runtime.consistent import check_start
 
-STILL = ("the motion stands still: it ends where it begins, so that errors, energy and least times tell nothing; set "
+STILL = ("the motion stands still: it ends where it begins, so that errors, energy and least times mean nothing; set "
          "system.initial to a state that moves")
 # A motion that nowhere goes farther than this stands still, relative to the largest entry of its start, or to 1 m, rad, m/s or
 # rad/s where that is smaller.

@@ -51,7 +51,7 @@ def base(tree: Tree, speed_rates: np.ndarray, a_0: np.ndarray) -> Base:
     """The base parameters of a tree.
 
     speed_rates   nodes of u_dot, (n_u,); a_0: acceleration of the base, n-frame, (3,), -gravity for the weight
-    Raises SymdynError where double precision does not tell what is independent.
+    Raises SymdynError where double precision does not determine what is independent.
     """
     if tree.parallel:  # parameters are constants in body-fixed axes only
         tree = build(tree.model, tree.algebra)

@@ -123,7 +123,7 @@ class BaseParameters:
 def base_parameters(equations: Equations) -> BaseParameters:
     """The base parameters of the equations of a tree.
 
-    Raises SymdynError for equations without bodies, and where double precision does not tell what is independent.
+    Raises SymdynError for equations without bodies, and where double precision does not determine what is independent.
     """
     if equations.identification is None and equations.bodies:
         raise SymdynError(f"{equations.name} has added mass or elastic bodies, which are no inertias of rigid bodies; leave them "

@@ -12,7 +12,7 @@ from symdyn.lab.peers.program import Program, State, unsorted_derivatives
 
 
 class CasadiPeer:
-    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages name what to install."""
 
     def __init__(self) -> None:
         self.compiler = c_compiler()

@@ -15,7 +15,7 @@ PARAMETERS = tuple("g m1 lc1 I1 m2 lc2 I2 m3 lc3 I3 l1 l2 l3 d".split())
 
 
 class KktPeer:
-    """The generator. Raises MissingExtra or CompilerNotFound, whose messages tell what to install."""
+    """The generator. Raises MissingExtra or CompilerNotFound, whose messages name what to install."""
 
     def __init__(self) -> None:
         package_folder("casadi")

@@ -15,7 +15,7 @@ from symdyn.lab.peers.program import Program, State, address, unsorted, unsorted
 
 
 class PinocchioPeer:
-    """The compiled algorithm. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+    """The compiled algorithm. Raises MissingExtra, CompilerNotFound or CompileError, whose messages name what to install."""
 
     def __init__(self) -> None:
         self.library = _library("pinocchio_aba")

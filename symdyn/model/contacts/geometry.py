@@ -38,7 +38,7 @@ WRITTEN_OUT = 12
 NEARLY = 1e-9
 # Variables of heights: real, and of names that no parameter has.
 REAL = (sp.Symbol("abscissa x", real=True), sp.Symbol("abscissa y", real=True))
-# Points of a circle and of a sphere that tell whether it touches elsewhere, too: parts of the radius, and how many all around.
+# Points of a circle and of a sphere that show whether it touches elsewhere, too: parts of the radius, and how many all around.
 AROUND = 12
 NEARBY = (-0.95, -0.7, -0.45, -0.2, 0.2, 0.45, 0.7, 0.95)
 RINGS = ((0.4, 6), (0.8, 8))

@@ -8,7 +8,7 @@ c + l(n): a sphere at l = -r n, a disc at the lowest point of its edge, a torus 
 in the components along x (and y). Newton's method finds s, with steps that are halved until |k| falls; derivatives follow by the
 implicit function theorem, ds = -(dk/ds)^-1 dk. While the shape is more curved than the hollows of the surface, dk/ds is positive
 and there is one solution at every c, however far away it is. Else the shape may touch in several places: points all around it
-tell whether it reaches lower elsewhere, where Newton's method then begins again.
+show whether it reaches lower elsewhere, where Newton's method then begins again.
 
 A shape of a compliant contact may be deeper than the surface. From s on, the same method then finds the point that is nearest to
 the deepest one of the shape: the two are apart along n, so that the depth is a distance, whose gradient is the normal.

@@ -19,8 +19,7 @@ from symdyn.runtime.memory import aligned
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# So many times the change that is rounding is none for sure: the states that are looked at here are those of a single motion to
-# rounding only.
+# Factor of rounding above which a change is certainly no rounding: the states here are those of a single motion to rounding only.
 SURE = 10.0
 
 

@@ -149,7 +149,7 @@ def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.
             failed = np.broadcast_to(error.states, len(left))
             reasons |= dict.fromkeys(left[failed].tolist(), str(error))
             left = left[~failed]
-        except (ArithmeticError, ValueError):  # of a function of the user, say, which does not tell the rows
+        except (ArithmeticError, ValueError):  # of a function of the user, say, which does not name the rows
             reasons |= _one_by_one(library, left, (t, x, inputs, p), xd)
             break
     for k in np.flatnonzero(~np.isfinite(xd).all(axis=1)).tolist():

@@ -22,8 +22,8 @@ INSTANTS = 60
 # Steps of the differences, parts of the run, and by how much they may be off, relative to the motion's own size in the run.
 STEPS = (1e-4, 1e-6, 1e-8, 1e-10)
 MISMATCH = 1e-3
-# So many intervals between the instants, those that fit worst, are halved so often in search of a jump, which is one if it is
-# more than this part of the motion's size.
+# Number of intervals between the instants, those that fit worst, that are halved in search of a jump, number of halvings; a jump
+# is one if it is more than this part of the motion's size.
 SEARCHED, HALVINGS, JUMPED = 8, 40, 1e-6
 # A spline whose value or rate jumps by more than this part of its size at a break has no acceleration there.
 JUMP = 1e-9

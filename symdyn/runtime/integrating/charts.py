@@ -75,7 +75,7 @@ def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarra
     for k, (joint, sequence, speeds, name) in enumerate(charts):
         limit = _limit(request.rtol, speeds)
         angle = x[:, module.metadata.x.index(name)]
-        # The angle turns back where it comes near, so that two outputs on the same side tell nothing; its rate hardly changes.
+        # The angle turns back where it comes near, so that two outputs on the same side show nothing; its rate hardly changes.
         before = np.abs(np.gradient(angle, t, edge_order=1))
         most = np.maximum(before[:-1], before[1:])
         wider = np.maximum(most, np.maximum(np.append(most[1:], 0), np.append(0, most[:-1])))

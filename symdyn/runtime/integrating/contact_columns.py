@@ -116,7 +116,7 @@ class Switch:
         return result
 
     def _later(self, moves: Moves, slope: np.ndarray) -> np.ndarray:
-        """By how much the switch comes later."""
+        """Delay of the switch."""
         along = Moves(np.ones(1), slope[None, :], 0 * moves.p[:1], 0 * moves.inputs[:1], np.ones(1))
         rates = self._differences(self._quantities, along, "its time")[0]
         moved = self._differences(self._quantities, moves, "its time")

@@ -63,10 +63,10 @@ LOWEST_FLIGHT = 1e-12
 MISSED = 1e-6
 # Velocities below this part of those before an impact, or of the largest rate, are none.
 NO_SPEED = 1e-11
-# So many switches within SAME_TIME of the run: the modes do not settle. So many that follow each other, in the mean, after less
-# than SHORTEST_FLIGHT of the run do not come to an end.
+# Number of switches within SAME_TIME of the run at which the modes do not settle; of those that follow each other, in the mean,
+# after less than SHORTEST_FLIGHT of the run and do not come to an end.
 MOST_SWITCHES, SAME_TIME, MOST_SHORT = 50, 1e-13, 1000
-# So many that follow each other faster than one in a step of time stepping are left to it, where method="auto" may.
+# Number of those faster than one in a step of time stepping that are left to it, where method="auto" may.
 MOST_FAST = 200
 # Number added to the diagonal of rows that depend on each other, relative to its size.
 SOFTNESS = 1e-8

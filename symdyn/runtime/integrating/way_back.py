@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 STRETCH = 128
 # An integrand is measured at the start of one of so many steps, at so many at once.
 SOME, GROUP = 4, 512
-# In how many parts a step is divided where the integrand of a loss needs shorter ones.
+# Number of parts that a step is divided into where the integrand of a loss needs shorter ones.
 PARTS = 8
 
 

@@ -1,7 +1,7 @@
 """Names that occur although the motion does not depend on them: parameters that cancel, such as a factor of all masses.
 
 Rounding leaves something of terms that cancel, and unstable motions magnify it without bound, so that the size of a sensitivity
-does not tell. The equations do: with other values of the parameter they give the same at all states of the motion.
+does not show. The equations do: with other values of the parameter they give the same at all states of the motion.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 // Newton method.
 //
 // Relative velocities are w = free + J du, du = M^-1 J^T P, row by row: the first row of a contact is along its normal, one or
-// two more along its tangents. Wanted is P with P_n >= 0, w_n >= 0, P_n w_n = 0, and |P_t| <= mu P_n, P_t = -mu P_n w_t/|w_t|
-// where w_t is not zero. This P is the root of P_n - max(0, P_n - w_n/d_n) and of P_t - (P_t - w_t/d_t projected onto the disc of
-// radius mu P_n). Dry friction of a joint has no normal row: the radius of its disc is given.
+// two more along its tangents. The unknown is P with P_n >= 0, w_n >= 0, P_n w_n = 0, and |P_t| <= mu P_n, P_t = -mu P_n
+// w_t/|w_t| where w_t is not zero. This P is the root of P_n - max(0, P_n - w_n/d_n) and of P_t - (P_t - w_t/d_t projected onto
+// the disc of radius mu P_n). Dry friction of a joint has no normal row: the radius of its disc is given.
 //
 // Source: Alart and Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods, 1991;
 // Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, chapters 12 and 13.

@@ -136,7 +136,7 @@ static double symdyn_halved(symdyn_run *run, double h, const double *x_new) {
     return sqrt(symdyn_square(run, x[1], x_new));
 }
 
-// Coefficients of the slopes in Legendre polynomials fall off at a rate that the last two tell; of twice as many the last one is
+// Coefficients of the slopes in Legendre polynomials fall off at a rate that the last two show; of twice as many the last one is
 // about the error, within a factor of 10 over 10 decades for pendulums and chains. At a kink they stop to fall off: where those
 // of degrees 5 to 7 are not small compared with 3 and 4, rough becomes the square of the error that the rate between these would
 // make.
@@ -162,7 +162,7 @@ static double symdyn_error(const symdyn_run *run, const double *x_new, double *r
     return sqrt(all / SYMDYN_NX) * fmax(pow(last[0] / all, exponents[0]), pow(last[1] / all, exponents[1]));
 }
 
-// One rough step in a hundred is done again by halves, which tell its error.
+// One rough step in a hundred is done again by halves, which give its error.
 static int symdyn_try(symdyn_run *run, double h, double t_new, double *x_new, double *xd_new, double *err) {
     (void)xd_new;
     const int failure = symdyn_collocate(run, run->t, h, run->x, run->method.low, 1.0, x_new, run->method.low_new);

@@ -27,8 +27,8 @@ static int symdyn_reason_of(symdyn_run *run, int reason, const double *out, int 
 // Rest after a projection: largest residuals of positions and speeds, relative to the length and to the largest speed, and what
 // rounding may leave of positions: 1e-13, or 4 eps |q| / length where that is more. Coordinates are known to eps |q| only, |q|
 // the largest of them in m (angles times the length), so that far away the residuals are no smaller; within 100 lengths or rad
-// nothing of this is felt. Too large is what exceeds 1e-9 and four times the rounding, of speeds 1e-8. The first that does is
-// noted.
+// nothing of this is felt. Residuals are too large above 1e-9 and four times the rounding, of speeds above 1e-8. The first that
+// does is noted.
 static int symdyn_left(symdyn_run *run, double t, const double *x, double *left, double *rounding) {
     const double length = run->problem.length, *u = x + SYMDYN_NQ;
     double speed = 1e-5 * length, far = 0.0, out[2 * SYMDYN_ROWS];

@@ -14,7 +14,7 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
 // The angle is reduced to h + l = x - n*pi/2 with |h| <= pi/4, where l is what rounding cuts off h. pi/2 has three parts,
 // the first two of 37 bits, so that their products with n are exact. Polynomials in z = h*h give sin(h + l) and cos(h + l);
-// the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
+// the last two bits of n show whether to exchange and to negate them. There is no branch, so that the compiler takes several
 // angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
 // (of the sine: the relative error times z); they are rounded one after the other, the rest fitted again each time.

@@ -146,7 +146,7 @@ static inline void symdyn_polynomial(const double *coefficients, int row, int de
         for (int i = 0; i < SYMDYN_NX; i++) y[i] = MADD(y[i], time, coefficients[k * row + i]);
 }
 
-// Whether a step is as good as its coefficients tell, which know nothing of a kink, a branch cut or a bend ahead: by what slope
+// Whether a step is as good as its coefficients show, which know nothing of a kink, a branch cut or a bend ahead: by what slope
 // and derivative at its end differ, times its length. This is about the tolerance for smooth motions. Returns 0 for a tenth of it
 // within the tolerance of each state, else that in the root mean square, 1 where it is tolerated.
 static inline double symdyn_defect(

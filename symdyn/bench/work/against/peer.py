@@ -12,7 +12,7 @@ from symdyn.errors import SymdynError
 
 # A run that would take longer is not made, s.
 LONGEST = 15.0
-# Seconds inside the integrator, evaluations of the right-hand side (0: it does not tell), state at the end in symdyn's order,
+# Seconds inside the integrator, evaluations of the right-hand side (0: unknown), state at the end in symdyn's order,
 # (n_x,), or states (n_t, n_x).
 Ran = tuple[float, int, np.ndarray]
 
