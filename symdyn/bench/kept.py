@@ -48,7 +48,7 @@ def closed(folder: Path) -> str:
 
 
 def writable(asked: Path | None, own: Path) -> Path:
-    """The file that is to be written: the one asked for, else the package's own; looked at before anything takes time.
+    """The file that is to be written: the requested one, else the package's own; looked at before anything takes time.
 
     Raises ArgumentError where it cannot be written, or holds anything but entries.
     """

@@ -16,7 +16,7 @@ OF_CONSTRAINTS = ("C_r", "F_d", "C")
 
 
 def derive(arguments: argparse.Namespace) -> int:
-    """Print the symbols, and every quantity that was asked for."""
+    """Print the symbols, and every quantity that was requested."""
     from symdyn.overview.equations import written_out
 
     equations = find_equations(arguments)

@@ -19,7 +19,7 @@ OTHERS = ("modelica", "fmu", "cmake")
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write files for every library and language that was asked for, a Modelica model, an FMU, a CMake package."""
+    """Write files for every library and language that was requested, a Modelica model, an FMU, a CMake package."""
     wanted = [target for target in TARGETS if getattr(arguments, target)]
     if not wanted and not any(getattr(arguments, other) for other in OTHERS):
         raise Stop(f"nothing to export: pass one of {', '.join(f'--{target}' for target in (*TARGETS, *OTHERS))}", WRONG)

@@ -35,7 +35,7 @@ def find_system(name: str, options: Mapping[str, Any]) -> System:
 
 def find_equations(arguments: argparse.Namespace,
                    find: Callable[[str, Mapping[str, Any]], System] = find_system) -> MotionEquations:
-    """The equations of the system with its options, in the formulation that was asked for; where none is named, the embedding,
+    """The equations of the system with its options, in the formulation that was requested; where none is named, the embedding,
     for closed loops and constraints the augmented one.
 
     find   gives the system of a name and options

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def generate(arguments: argparse.Namespace) -> int:
-    """Write the files of every backend that was asked for."""
+    """Write the files of every backend that was requested."""
     equations = find_equations(arguments)
     write_files(equations, arguments.backend or ["c", "numpy"], arguments.output, arguments.functions,
                 arguments.templates)

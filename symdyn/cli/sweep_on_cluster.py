@@ -98,7 +98,7 @@ def show_status(folder: Path, cluster: Cluster | None) -> int:
 
 
 def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: Path, formats: tuple[str, ...]) -> int:
-    """Predict, write down what is asked for, and submit workers. Raises Stop where the cluster gives them too little."""
+    """Predict, write down what is requested, and submit workers. Raises Stop where the cluster gives them too little."""
     from symdyn.ensembles.claims import Claims
     from symdyn.ensembles.lock import OneRun
     from symdyn.ensembles.prediction import contradictions

@@ -50,7 +50,7 @@ def write_archive(path: Path, entries: Iterable[Entry]) -> None:
 
 @contextlib.contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """The arrays of an archive, each read when it is asked for."""
+    """The arrays of an archive, each read when it is requested."""
     with np.load(path, allow_pickle=False) as archive:
         yield archive
 

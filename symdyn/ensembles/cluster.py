@@ -52,7 +52,7 @@ class Cluster:
 
     cores    of each worker; None: those of its node
     memory   of each worker, bytes;  time: after which a worker is ended, s;  price: of a core for an hour
-    nodes    whole nodes are asked for, one for each worker
+    nodes    whole nodes are requested, one for each worker
     gpus     that each worker asks for, where the device is a GPU; None: one
     """
 

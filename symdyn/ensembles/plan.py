@@ -47,7 +47,7 @@ VECTORS_FROM = 2000
 class Plan:
     """Plan of a computation.
 
-    size   samples in a chunk, as it was asked for; None: by their number
+    size   samples in a chunk, as it was requested; None: by their number
     """
 
     setting: Setting

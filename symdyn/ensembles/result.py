@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Ensemble:
-    """Outcomes of all members, in the order of the samples; arrays are read from the file when they are asked for.
+    """Outcomes of all members, in the order of the samples; arrays are read from the file when they are requested.
 
     path       the folder;  file: its ensemble.npz
     names      what was sampled, of which `varied` is not the same in all;  labels: outcomes, `traces` those over the times t;

@@ -160,7 +160,7 @@ class StillAtWork(Exception):
 
 
 def prepare(asked: Plan, folder: Path, resume: bool) -> tuple[Plan, Store]:
-    """Try some samples, unless that was done, and write down what is asked for in the folder, unless that stands there.
+    """Try some samples, unless that was done, and write down what is requested in the folder, unless that stands there.
 
     Raises ArgumentError where a folder holds something else; OSError as the disk does.
     """

@@ -165,7 +165,7 @@ class Samples:
                 engine, there = qmc.Sobol(n, seed=self.seed), 0
             if first > there:
                 engine.fast_forward(first - there)
-            # The first point by itself, so that no power of two is asked for.
+            # The first point by itself, so that no power of two is requested.
             parts = [engine.random(m) for m in ((1, count - 1) if first == 0 and count else (count,)) if m]
             self._sequence = engine, first + count
         return np.vstack([np.zeros((0, n)), *parts])

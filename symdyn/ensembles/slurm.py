@@ -22,7 +22,7 @@ NOTICE = 60
 PATIENCE = 60.0
 
 
-# A worker for each GPU that Slurm gives the job, which are not all, or more than were asked for, on whole nodes.
+# A worker for each GPU that Slurm gives the job, which are not all, or more than were requested, on whole nodes.
 EACH_GPU = """\
 workers=
 trap 'kill $workers' TERM

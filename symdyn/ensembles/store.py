@@ -147,7 +147,7 @@ class Store:
 
 
 def check_folder(folder: Path, resume: bool) -> dict[str, Any] | None:
-    """The manifest in a folder; None if no run began there. Raises ArgumentError unless that is as it was asked for."""
+    """The manifest in a folder; None if no run began there. Raises ArgumentError unless that is as it was requested."""
     path = folder / MANIFEST
     if not path.is_file():
         if folder.is_dir() and any(not p.name.startswith(".") for p in folder.iterdir()):  # what a kill left is hidden

@@ -46,7 +46,7 @@ class Case:
     rtol, atol      of the compared run
     long            s over which violations are looked at
     end             s of the compared run (default: the system's duration, which is the published one)
-    reference       made when it is asked for; None: there is none but the motion at more digits
+    reference       made when it is requested; None: there is none but the motion at more digits
     bounds          what its figures should be at most: "error_q", "error_u", "precise"
     """
 

@@ -35,7 +35,7 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 
 class Computed:
-    """The variables of a parsed model on rows of states: each by its equation, when it is asked for.
+    """The variables of a parsed model on rows of states: each by its equation, when it is requested.
 
     known   name -> values of states, inputs, the time, and of parameters that are not at their defaults
     Values that need a numeric algorithm are NaN.

@@ -245,7 +245,7 @@ GROUPS = (cvodes, gradient, memory, fit, diffrax)
 
 def run(only: Sequence[str] | None = None) -> int:
     """Print every figure; returns the number of those that miss their bound. diffrax is left out where it is not installed,
-    unless it is asked for by name, which raises MissingExtra."""
+    unless it is requested by name, which raises MissingExtra."""
     missing = _missing()
     if missing and not only:
         count = print_figures(GROUPS[:-1])

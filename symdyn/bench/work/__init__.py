@@ -4,7 +4,7 @@
     system_under_test             its formulations, and errors of motions in any coordinates
     start                         where motions begin, and whether anything moves
     reference, converged, store   what errors are measured by: closed forms, runs with more digits, runs that agree
-    methods, asked                what can be asked for, checked
+    methods, asked                what can be requested, checked
     measure, against              one row of ours, and of another program
     plan, timing                  all rows in their order, and passes over them for their times
     benchmark, resume, carried    the run that goes on where it was stopped, the result, rows kept for later runs
@@ -47,14 +47,14 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    processes of their own then, on Linux; preparing counts, and is ended, and reported, where it takes too long
                    of what is left
     folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed again
-                   at the end if there is time for that, else the rows report it; rows that are not asked for stay in the file for
+                   at the end if there is time for that, else the rows report it; rows that are not requested stay in the file for
                    a later run
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s; runs that end there are timed alone
     per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and determine the least time below an error more
                    sharply
 
-    Raises ArgumentError that lists everything that is wrong with what is asked for; SymdynError if nothing can be measured.
+    Raises ArgumentError that lists everything that is wrong with what is requested; SymdynError if nothing can be measured.
 
     >>> found = sd.bench("pendulum", ["embedding"], methods=["dop853"], tolerances=[1e-6], end=1.0, repeats=1)
     >>> [(row.method, row.tolerance) for row in found.rows]

@@ -39,7 +39,7 @@ class Asked:
 def faults_of(systems: Sequence[SystemUnderTest], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
               steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (),
               per_decade: Any = 1) -> list[str]:
-    """Everything that is wrong with what is asked for, a sentence each."""
+    """Everything that is wrong with what is requested, a sentence each."""
     known = list(dict.fromkeys(name for tested in systems for name in tested.names))
     # Where nothing was found that could be measured, nothing is known of its formulations.
     faults = [*(_unknown(formulations, known, "formulation") if known else ()),

@@ -43,7 +43,7 @@ class Benchmark:
     measure         of what errors are: STATE, or BODIES if formulations with different coordinates take part
     timed           when this run began; command: identifies the command it belongs to, if that measures several mechanisms
     notes           what a reader must know of the motion, a sentence each
-    asked           keys of all rows that were asked for; motion: identifies the motion, machine and code, fingerprint also what
+    asked           keys of all rows that were requested; motion: identifies the motion, machine and code, fingerprint also what
                     errors are of; carried: rows of earlier runs that were not asked for, which a later one may go on with
     """
 
@@ -220,7 +220,7 @@ def finished(tested: SystemUnderTest, asked: Asked, folder: Path, command: str) 
 
 
 def _formulated(tested: SystemUnderTest, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation, str]:
-    """Formulations, those left out, the first there is, whatever was asked for: errors are measured by its motion; and what was
+    """Formulations, those left out, the first there is, whatever was requested: errors are measured by its motion; and what was
     changed in the start, if it was not on the constraints, else nothing.
 
     Raises SymdynError if there is none.

@@ -28,7 +28,7 @@ class Carried:
     done: frozenset[Key] = frozenset()
 
     def kept(self, mark: str, asked: Iterable[Key]) -> dict[Key, Row]:
-        """The rows that a run goes on with; none if the latest one was done with all that is asked for: it is measured again.
+        """The rows that a run goes on with; none if the latest one was done with all that is requested: it is measured again.
 
         mark   fingerprint
         """

@@ -23,10 +23,10 @@ FILES = (RESULTS, "work_precision.png", "work_precision.svg", "report.html")
 
 
 def run(arguments: argparse.Namespace, find: Callable[[str], SystemUnderTest]) -> int:
-    """Measure what was asked for; returns how many mechanisms could not be measured, and at least 1 if nothing was.
+    """Measure what was requested; returns how many mechanisms could not be measured, and at least 1 if nothing was.
 
     find   what is measured under a name; raises SymdynError for one that there is not
-    Raises ArgumentError that lists everything that is wrong with what was asked for.
+    Raises ArgumentError that lists everything that is wrong with what was requested.
     """
     begun = clock.perf_counter()
     names = list(dict.fromkeys([*arguments.systems, *(CASES if arguments.all else ())]))

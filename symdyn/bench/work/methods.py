@@ -19,7 +19,7 @@ AUTO = "auto"
 
 
 def names() -> list[str]:
-    """Every method that can be asked for."""
+    """Every method that can be requested."""
     return [*COMPILED, AUTO, *SCIPY]
 
 

@@ -21,7 +21,7 @@ _PLAIN: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "bool": (bo
 class Row:
     """One run: a formulation with a method at one tolerance, or with one step.
 
-    formulation, method   names as they are asked for; peer: the method is another program's
+    formulation, method   names as they are requested; peer: the method is another program's
     tolerance, step       relative and absolute tolerance of a step, or its length, s; the other is None
     seconds               inside the integrator, median of `repeats` runs; least: the shortest of them
     evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not report it

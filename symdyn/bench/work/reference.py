@@ -29,7 +29,7 @@ _SHOWN = 160
 
 
 def default_times(tested: SystemUnderTest) -> list[float]:
-    """Ten times, evenly over the motion, the last of them its end, and those that are asked for, s."""
+    """Ten times, evenly over the motion, the last of them its end, and those that are requested, s."""
     even = [tested.end * k / N_TIMES for k in range(1, N_TIMES + 1)]
     return sorted({*even, *[float(t) for t in tested.at]})
 

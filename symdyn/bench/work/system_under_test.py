@@ -77,7 +77,7 @@ class SystemUnderTest:
 
     @property
     def names(self) -> list[str]:
-        """Every formulation that can be asked for."""
+        """Every formulation that can be requested."""
         if self.given is not None:
             return [GIVEN]
         others = list(self.variants)[1:]

@@ -66,7 +66,7 @@ def earlier(benchmark: Benchmark) -> str:
 
 
 def choices(benchmark: Benchmark) -> str:
-    """Why auto chose what it did; empty where it was not asked for."""
+    """Why auto chose what it did; empty where it was not requested."""
     first = {(row.formulation, row.chosen): row for row in reversed(benchmark.rows) if row.chosen}
     why = [f"{row.formulation} from {row.setting} {row.chosen}, {row.why}" for row in reversed(first.values())]
     return f"auto chose by short trial runs, which are not in the times: {'; '.join(why)}" if why else ""

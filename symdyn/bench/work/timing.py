@@ -17,7 +17,7 @@ PASSES = 3
 # often as asked at most: on a machine with other work a median of few of them says nothing.
 ENOUGH, MUCH, MOST = 2.0, 0.01, 8
 
-# repeats asked for in all passes together -> s inside the integrator of the runs of one pass, evaluations of the right-hand side
+# repeats requested in all passes together -> s inside the integrator of the runs of one pass, evaluations of the right-hand side
 Pass = Callable[[int], tuple[list[float], int]]
 
 
@@ -62,7 +62,7 @@ class Timing:
 def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:
     """Times of the runs of one pass, s, each by its own clock.
 
-    repeats    asked for in all passes together;  deadline: of time.perf_counter, after which none is begun
+    repeats    requested in all passes together;  deadline: of time.perf_counter, after which none is begun
     """
     now: list[float] = []
     each = -(-repeats // PASSES)

@@ -160,7 +160,7 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
               left there is gone on with: mechanisms that were done stay, of others the tolerances that were found; those that
               are not named stay in the file as they are
     progress  show a bar (needs tqdm)
-    Raises SymdynError that lists everything that is wrong with what is asked for.
+    Raises SymdynError that lists everything that is wrong with what is requested.
     """
     faults = [f"there is no published mechanism {name!r}; there are {', '.join(CASES)}" for name in names or ()
               if name not in CASES]
@@ -189,7 +189,7 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
         if result is not None:
             name = result.case.name
             known[name] = {**result.record(), **about, "fingerprint": marks[name], "timed": timed}
-        # Mechanisms that were not asked for stay as they are.
+        # Mechanisms that were not requested stay as they are.
         kept = {**{name: r for name, r in stored.items() if name not in marks}, **known}
         files.write(folder / RESULTS, {"mechanisms": [kept[name] for name in dict.fromkeys((*CASES, *kept)) if name in kept]})
 

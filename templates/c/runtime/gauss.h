@@ -101,7 +101,7 @@ static int symdyn_begin(symdyn_run *run) {
 }
 
 // The next step: a whole one, or a part of one that was given up. The first one says how long they are; where more than one in
-// eight is given up, they get shorter. A length that was asked for is given up only where the sweeps find no end.
+// eight is given up, they get shorter. A length that was requested is given up only where the sweeps find no end.
 static int symdyn_ahead(symdyn_run *run) {
     const double left = fabs(run->method.t_first + run->direction * (double)run->method.n_whole * run->method.h_whole - run->t);
     const int first = run->rejected && !run->method.fixed && run->n_steps == 0,
@@ -112,7 +112,7 @@ static int symdyn_ahead(symdyn_run *run) {
         for (int k = 0; k < SYMDYN_NX; k++) run->method.low[k] = run->method.low_new[k];
     if (part
         && fmin(left, run->method.fixed ? fabs(run->h_try) : left)
-            > (1.0 - 1e-6) * run->method.h_whole) {  // each that was asked for once
+            > (1.0 - 1e-6) * run->method.h_whole) {  // each that was requested once
         run->method.n_given_up++;
         run->method.t_rough = run->method.n_rough ? run->method.t_rough : run->t;
     }

@@ -37,7 +37,7 @@ static int symdyn_close(symdyn_run *run, double t, const double *x, int *open, d
     return 0;
 }
 
-// Put x, after the resets of the entries that are asked for, onto the constraints: these entries stay, all others change by as
+// Put x, after the resets of the entries that are requested, onto the constraints: these entries stay, all others change by as
 // little as can be in the metric of the mass matrix, first coordinates, then speeds. x_old: the state before. Returns 0 or a
 // failure: what the constraints do not let an entry be is one.
 static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, double *x, const int *asked) {
@@ -103,7 +103,7 @@ static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, do
 }
 
 #if SYMDYN_SENSITIVE
-// Close gaps of entries, see symdyn_close, in a column; which: those of coordinates, 0, or of speeds, 1, that are asked for.
+// Close gaps of entries, see symdyn_close, in a column; which: those of coordinates, 0, or of speeds, 1, that are requested.
 static int symdyn_close_column(
     symdyn_run *run, double t, const double *x, const int *asked, int which, const double *gaps, double *column) {
     int open[SYMDYN_HELD];

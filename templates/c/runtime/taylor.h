@@ -134,7 +134,7 @@ static int symdyn_ahead(symdyn_run *run) {
         run->method.unit = exp2(floor(log2(far)));
     }
     if (!(h > 0.0)) return symdyn_fail(run, SYMDYN_STATE_NOT_FINITE, 0, -1, run->t, run->x);
-    // At first it is what was asked for.
+    // At first it is the requested one.
     run->h = run->method.h_before = run->method.h_before == 0.0 && run->h > 0.0 ? fmin(run->h, h) : h;
     return SYMDYN_STEP_LIMIT;
 }

@@ -60,7 +60,7 @@ class Mujoco:
             return np.array(data.qacc)[back]
 
         def motion(n: int, every: list[np.ndarray] | None = None) -> tuple[float, np.ndarray]:
-            """n steps, and where it is asked for, the state after every one of them."""
+            """n steps, and where it is requested, the state after every one of them."""
             model.opt.timestep = end / n
             begin(q0, u0)
             mujoco.set_mju_user_warning(lambda text: None)  # which it would write into a file; the state at the end shows it
