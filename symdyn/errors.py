@@ -41,7 +41,7 @@ class CacheWarning(UserWarning):
 
 
 class CompilerNotFound(SymdynError):
-    """There is no usable C compiler, or not the one that was asked for."""
+    """There is no usable C compiler, or not the one that was requested."""
 
 
 class CompilerWarning(UserWarning):

@@ -157,7 +157,7 @@ class SystemFacade:
         specialize   parameters, by symbol or name, that become numbers in the code and are folded
         rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False
 
-        Raises what `equations` raises, CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects
+        Raises what `equations` raises, CompilerNotFound if C is requested and there is no compiler, CompileError if it rejects
         the code, SymdynError for loops with the backend "numpy", which has none.
 
         >>> sd.systems.pendulum().compile(backend="numpy").rhs(0.0, [0.1, 0.0]).round(6)
@@ -293,7 +293,7 @@ class EquationsFacade:
         rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False;
                      `module.report` says which
 
-        Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code, SymdynError for
+        Raises CompilerNotFound if C is requested and there is no compiler, CompileError if it rejects the code, SymdynError for
         loops with the backend "numpy", which has none.
 
         >>> equations = sd.systems.pendulum().embedding()

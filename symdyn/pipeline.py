@@ -41,7 +41,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
     rolled       C only: whether statements that like bodies repeat become loops: "auto" where they are many, True, False
 
     Only what is called is generated: rhs with the integrator first, every other function when it is first used.
-    Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
+    Raises CompilerNotFound if C is requested and there is no compiler, CompileError if it rejects the code.
     """
     fallback = ""
     if templates is not None:

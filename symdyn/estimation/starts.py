@@ -138,7 +138,7 @@ class Start:
             change = self._dependents(C_q, self._dependent_q, C)
             x[self._dependent_q] += change
             size = float(np.abs(change * self._lengths[self._dependent_q]).max(initial=0.0))
-            # Rounding of what is large may keep steps from getting smaller than what is asked for.
+            # Rounding of what is large may keep steps from getting smaller than what is requested.
             if size <= _SOLVED * self._size or (size <= 1e-9 * self._size and size >= 0.5 * last):
                 return x
             last = size

@@ -201,7 +201,7 @@ class Writer:
 
     def write(self, value: Value, operations: float = math.inf, derived: Callable[[float], tuple[sp.Expr, int]] | None = None
               ) -> sp.Expr:
-        """The value in the form asked for.
+        """The value in the requested form.
 
         operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form and
                      counts its operations, taking factors out up to so many; it is taken if it is the shortest
@@ -391,7 +391,7 @@ def _times(coefficient: Any, parts: list[sp.Expr]) -> sp.Expr:
 
 def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str = "shortest", bound: int | None = None,
             unit_vectors: Sequence[Sequence[Node]] = (), zeros: Sequence[Any] = ()) -> list[sp.Expr]:
-    """Entries (nodes and numbers) in SymPy, each in the form asked for; unit_vectors: leaves whose squares add up to one;
+    """Entries (nodes and numbers) in SymPy, each in the requested form; unit_vectors: leaves whose squares add up to one;
     zeros: entries that vanish where the forms are to hold.
 
     Raises SymdynError for an unknown form, TooLarge beyond the bound on terms, UnsupportedExpression for what has no explicit
@@ -426,7 +426,7 @@ def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str =
 
 
 def shortest(value: Any, form: str = "shortest") -> Any:
-    """An expression or matrix of SymPy in the form asked for; its symbols are taken as real.
+    """An expression or matrix of SymPy in the requested form; its symbols are taken as real.
 
     Raises as `written`, and UnsupportedExpression for functions that have no counterpart on a tape."""
     entries, symbols = recorded(value if isinstance(value, sp.MatrixBase) else [value])

@@ -50,7 +50,7 @@ class Table:
 
 
 def numbers(value: Any, what: str, faults: list[str], size: int | None = None) -> np.ndarray | None:
-    """A row of finite numbers, of the size that is asked for; None, and a fault, where it is not one.
+    """A row of finite numbers, of the size that is requested; None, and a fault, where it is not one.
 
     One number stands for a row where the size is given.
     """

@@ -1,4 +1,4 @@
-"""Results of every formulation: quantities by name, recorded when asked for, printed by expanding their tape."""
+"""Results of every formulation: quantities by name, recorded when requested, printed by expanding their tape."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Symbols:
 
 @dataclass(frozen=True, eq=False)
 class Equations(EquationsFacade):
-    """Equations of motion whose quantities are recorded on one tape when they are asked for.
+    """Equations of motion whose quantities are recorded on one tape when they are requested.
 
     name         of the mechanism; formulation: how it was derived
     leaves       symbol -> leaf of the tape

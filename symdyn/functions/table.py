@@ -130,7 +130,7 @@ VARIATIONS = _entries(
      "the same derivative of the linear form of its first three parts in v (q' = N v), u', u_dot', z', lam'", ""),
     ("outputs_variation", "outputs_variation", None, "the same derivative of the outputs", "outputs"),
 )
-# Further derivatives, each made by itself when it is asked for.
+# Further derivatives, each made by itself when it is requested.
 DERIVATIVES = _entries(
     ("stiffness", "stiffness", ("n_u", "n_q"),
      "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by q; ud: u_dot, lam", ""),

@@ -37,7 +37,7 @@ class Line:
 class Quantity:
     """A quantity: its lines, or the note that says why there are none.
 
-    steps   how many lines are steps on the way to it; shown: the first line after these that is only shown if asked for
+    steps   how many lines are steps on the way to it; shown: the first line after these that is only shown if requested
     """
 
     name: str

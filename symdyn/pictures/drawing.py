@@ -106,7 +106,7 @@ class Drawing:
         forces    with arrows of forces in joints, loads and weights; those of contacts are always there
         span      the part of the motion that is shown, s, and for which rails and what has no size are long enough; None: all
         inertia   with the ellipsoids of inertia
-        Raises ArgumentError where these are asked for and no body has one.
+        Raises ArgumentError where these are requested and no body has one.
         """
         if "positions" not in solution.module.functions:
             return None

@@ -39,7 +39,7 @@ def available() -> int:
 def demand(numbers: int, owner: str, what: str, remedy: str) -> None:
     """Raise ArgumentError if so many doubles are more than the memory that is available.
 
-    what     that is asked for, with its size; remedy: what to do
+    what     that is requested, with its size; remedy: what to do
     """
     if numbers < 2**20:  # 8 MB need no look at the system
         return

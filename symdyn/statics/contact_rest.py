@@ -418,7 +418,7 @@ class _Forces:
 
     def _solved(self, cost: np.ndarray, of_slack: float) -> tuple[Any, float]:
         """y of least cost with all planes (and the largest slack where of_slack is -1), and the slack; takes best as far as the
-        slack is asked for."""
+        slack is requested."""
         from scipy.optimize import linprog
 
         m = self.free.shape[1]

@@ -37,7 +37,7 @@ class OperatingPoint:
     lam: np.ndarray
 
     def __post_init__(self) -> None:
-        for name in ("x", "p", "inputs", "ud", "lam"):  # results are evaluated from them when they are asked for
+        for name in ("x", "p", "inputs", "ud", "lam"):  # results are evaluated from them when they are requested
             object.__setattr__(self, name, fixed(getattr(self, name)))
 
     def at(self, **changes: Any) -> OperatingPoint:

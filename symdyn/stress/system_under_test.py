@@ -69,7 +69,7 @@ class SystemUnderTest:
 
     @cached_property
     def everything(self) -> tuple[str, ...]:
-        """All functions but derivatives, which are compiled when they are asked for; of long equations also without those of
+        """All functions but derivatives, which are compiled when they are requested; of long equations also without those of
         identification."""
         long = self.equations.tape("rhs").operations > LONG
         without = {*SELDOM, *IDENTIFICATION} if long else set(SELDOM)

@@ -97,7 +97,7 @@ class Sample:
 
 
 class Values:
-    """Quantities by name, evaluated when asked for."""
+    """Quantities by name, evaluated when requested."""
 
     def __init__(self, sample: Sample, values: Mapping[str, Any]) -> None:
         self.sample = sample

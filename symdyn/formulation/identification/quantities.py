@@ -59,7 +59,7 @@ class Identification:
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """The base parameters of equations of motion, tau = Y_b pi_b; explicit SymPy is made when it is asked for.
+    """The base parameters of equations of motion, tau = Y_b pi_b; explicit SymPy is made when it is requested.
 
     tau = M_tilde u_dot + k_tilde less what gravity gives: what all other loads together must give along the speeds.
     A parameter is named after what it is and the link that it is counted to, in the axes of the link's joint frame (child

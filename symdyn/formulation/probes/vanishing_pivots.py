@@ -152,7 +152,7 @@ class _Search:
 
 class _Position:
     """A tree at random values of everything that it depends on, the same ones of parameters at all positions; links are evaluated
-    when they are first asked for.
+    when they are first requested.
 
     alive   speeds that are still asked about, which get fewer while the links are gone through
     """

@@ -24,7 +24,7 @@ from symdyn.spatial.vectors import vector
 
 
 class Page:
-    """The recursions of a tree, each recorded once, when one of its quantities is first asked for.
+    """The recursions of a tree, each recorded once, when one of its quantities is first requested.
 
     Quantities of link k = 1, 2, ... (in the order of tree.links; bodies on fixed joints belong to the link before them), in space
     also for planar systems:

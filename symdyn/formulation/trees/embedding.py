@@ -2,7 +2,7 @@
 
 With J the velocity transformation, [v_G; omega] = J u, the lecture has M_tilde = J^T M J, k_tilde = J^T (M J_dot u + Q J u)
 and F_tilde = J^T F (chapters 3.2 and 6.2). The same numbers come cheaper without forming J: M_tilde by composite bodies,
-k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J itself is formed where it is asked for.
+k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J itself is formed where it is requested.
 """
 
 from __future__ import annotations

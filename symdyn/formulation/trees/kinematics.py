@@ -1,6 +1,6 @@
 """Positions, velocities and the velocity transformation J in the n-frame, as the lecture writes them.
 
-Recorded only where they are asked for: the equations themselves are formed in link axes.
+Recorded only where they are requested: the equations themselves are formed in link axes.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from symdyn.spatial.vectors import zeros
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecursiveEquations(MotionEquations):
-    """tau by Newton-Euler, u_dot by articulated bodies; M_tilde by composite bodies where it is asked for.
+    """tau by Newton-Euler, u_dot by articulated bodies; M_tilde by composite bodies where it is requested.
 
     links   names of the links, parents first; `link` gives what the lecture's pages name of one
     """

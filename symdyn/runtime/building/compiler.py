@@ -30,7 +30,7 @@ class Compiler:
     command  the absolute path of the program, then its fixed arguments
     kind     'gcc', 'clang', 'zig', 'tcc', or 'other' (called like gcc)
     version  first line of its `--version`
-    note     why a compiler asked for earlier ($CC) was passed over; usually empty
+    note     why a compiler requested earlier ($CC) was passed over; usually empty
     """
 
     command: tuple[str, ...]

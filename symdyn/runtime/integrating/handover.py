@@ -63,7 +63,7 @@ def _rest(request: Request, parts: list[Outcome], max_steps: int | None) -> Requ
 
 
 def _joined(request: Request, parts: list[Outcome], note: str) -> Outcome:
-    """One run from its parts. Where parts meet both have a row; that stays where every step, or this time, was asked for. The
+    """One run from its parts. Where parts meet both have a row; that stays where every step, or this time, was requested. The
     last row, where the run stopped, stays always."""
     t, x = np.concatenate([part.t for part in parts]), np.concatenate([part.x for part in parts])
     meets = np.cumsum([len(part.t) for part in parts])[:-1]

@@ -69,7 +69,7 @@ class _Pieces:
         """To the end, or as far as it gets."""
         request, inputs = self.request, self.request.inputs
         t, end = request.span
-        last = end if request.times is None else float(request.times[-1])  # what is beyond is not asked for
+        last = end if request.times is None else float(request.times[-1])  # what is beyond is not requested
         x = request.x0
         holding: Replay | Sampling = Replay(inputs.record) if inputs.record is not None else \
             Sampling(inputs.samplers, inputs.constant, t, len(request.columns))

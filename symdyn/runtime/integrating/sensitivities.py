@@ -81,7 +81,7 @@ class Asked:
     def added_to(self, request: Request, controlled: bool, inputs: Sequence[str]) -> Request:
         """The request with the columns behind the state; inputs: names.
 
-        Tolerances are such that the error of the state, and of every column if they are controlled, is within what was asked for
+        Tolerances are such that the error of the state, and of every column if they are controlled, is within what was requested
         in its own root mean square: they count in that of all entries.
         """
         rtol, atol = tolerances(request.rtol, request.atol, self.sizes, controlled)

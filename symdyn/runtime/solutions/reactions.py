@@ -1,4 +1,4 @@
-"""Forces in the joints of a solution, in the axes that are asked for."""
+"""Forces in the joints of a solution, in the axes that are requested."""
 
 from __future__ import annotations
 

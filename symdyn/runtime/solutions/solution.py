@@ -1,4 +1,4 @@
-"""Solution: a computed motion; time first. Energy and outputs are evaluated when asked for."""
+"""Solution: a computed motion; time first. Energy and outputs are evaluated when requested."""
 
 from __future__ import annotations
 
