@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from symdyn.tape.floats import Entries
 
 # With so many places at least, and entries in this part of them at most, sparse factors are taken.
-LEAST_PLACES, LARGEST_PART = 50_000, 0.1
+LEAST_PLACES, LARGEST_PART = 20_000, 0.1
 # Part of the square of the largest entry of a row by which least changes are damped, and rounds that take the damping off again.
 DAMPING, ROUNDS = 1e-12, 4
 # Rounds of the power iterations for the largest and for the smallest singular value.
