@@ -77,8 +77,9 @@ class _Checker:
         if s.chosen_speeds:
             self.speeds, self.eliminated = chosen_speeds(s, self.coordinates, self.own_speeds, self.faults)
             constraints = tuple(c for c in constraints if c not in self.eliminated)
-        self.parameters, self.inputs = check_symbols(s, self.joints, self.loads, self.coordinates, self.own_speeds, self.faults)
-        elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in symbols_in(expressions)]
+        self.uses = list(uses(s, self.joints, self.loads))
+        self.parameters, self.inputs = check_symbols(s, self.joints, self.uses, self.coordinates, self.own_speeds, self.faults)
+        elsewhere = [symbol for _, expressions, _ in self.uses for symbol in symbols_in(expressions)]
         self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
         state = [*self.coordinates, *self.speeds, *[z.symbol for z in s.states]]
         rates = [*self.own_speeds, *[q.dot for q in self.coordinates]]
@@ -100,7 +101,7 @@ class _Checker:
             if doubt not in s._warned:  # every formulation checks the system again
                 s._warned.add(doubt)
                 warnings.warn(doubt, ModelWarning, stacklevel=4)
-        units = {**units_of(s, self.joints, self.loads), **self.units}
+        units = {**units_of(s, self.joints, self.loads, self.uses), **self.units}
         of_lengths = {"rad": "rad/s", "m": "m/s"}
         units = {**{u: of_lengths.get(unit_of(e, units), "") for u, e in s.chosen_speeds.items()}, **units}
         return Model(
@@ -250,7 +251,7 @@ class _Checker:
         for output in self.system.outputs:
             if isinstance(output.value, Point):
                 self._resolve(output.value.body, f"output {shown(output.name)}: body")
-        for where, expressions, _ in uses(self.system, self.joints, self.loads):
+        for where, expressions, _ in self.uses:
             for quantity in quantities_in(expressions):
                 self._quantity(quantity, where)
 

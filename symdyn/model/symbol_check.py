@@ -16,7 +16,7 @@ from symdyn.model.loop_check import constraint_faults
 from symdyn.model.quantity import Quantity, of_speeds
 from symdyn.model.record import joint_speeds
 from symdyn.model.symbols import Acceleration, Coordinate, GivenMotion, Input, Rate, described, symbols_of, time, with_rates
-from symdyn.model.uses import Scope, uses
+from symdyn.model.uses import Scope, Use
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -92,14 +92,14 @@ def chosen_speeds(s: System, coordinates: Symbols, own: Symbols, faults: Faults)
     return chosen, of_motion
 
 
-def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coordinates: Symbols, speeds: Symbols,
+def check_symbols(s: System, joints: Sequence[Joint], used: Iterable[Use], coordinates: Symbols, speeds: Symbols,
                   faults: Faults) -> tuple[Symbols, Symbols]:
-    """Parameters and inputs in order of their use; symbols that stand where they must not are added to the faults."""
+    """Parameters and inputs in order of their use, see `uses`; symbols that stand where they must not are added to the faults."""
     moving = {time, *coordinates, *[q.dot for q in coordinates], *speeds, *s.chosen_speeds, *[z.symbol for z in s.states]}
     named = {symbol.name: symbol for symbol in [*moving, *(s.declared or ())]}
     parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
     inputs: dict[sp.Symbol, None] = {}
-    for where, expressions, scope in uses(s, joints, loads):
+    for where, expressions, scope in used:
         constant = scope == Scope.PARAMETERS
         for symbol in symbols_in(expressions):
             if isinstance(symbol, Quantity):

@@ -35,7 +35,10 @@ class Scope(IntEnum):
     FORCES = 3  # accelerations of points, multipliers, reactions
 
 
-def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], Scope]]:
+Use = tuple[str, Iterable[sp.Expr], Scope]
+
+
+def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[Use]:
     """(where, expressions, what may occur in them), in the order of description; points of quantities follow those."""
     for where, expressions, scope in _uses(system, joints, loads):
         listed = list(expressions)
@@ -45,7 +48,7 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
                 yield f"{where}: point of {quantity}", point, Scope.PARAMETERS
 
 
-def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], Scope]]:
+def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[Use]:
     s = system
     yield "gravity", s.gravity, Scope.PARAMETERS
     for body in s.bodies:
@@ -93,13 +96,13 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
         yield constraint.name, [constraint.expression], Scope.MOTION
 
 
-def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> dict[sp.Symbol, str]:
-    """The unit of every symbol that stands alone where its unit is known."""
+def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any], used: Iterable[Use]) -> dict[sp.Symbol, str]:
+    """The unit of every symbol that stands alone where its unit is known; used: see `uses`."""
     units: dict[sp.Symbol, str] = {time: "s"}
 
     def note(expressions: Iterable[sp.Expr], unit: str) -> None:
         for e in flat(expressions) if isinstance(expressions, sp.MatrixBase) else expressions:
-            core = e if isinstance(e, sp.Symbol) else -e if e.could_extract_minus_sign() else e
+            core = e.args[1] if e.is_Mul and len(e.args) == 2 and e.args[0] == -1 else e
             if isinstance(core, sp.Symbol):
                 units.setdefault(core, unit)
 
@@ -149,8 +152,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
     for output in s.outputs:
         if isinstance(output.value, Point):
             note(output.value.at, "m")
-    for _, used, _ in _uses(s, joints, loads):
-        for quantity in quantities_in(used):
+    for _, expressions, _ in used:
+        for quantity in quantities_in(expressions):
             for point in quantity.measure.points:
                 note(point, "m")
     return units
