@@ -105,7 +105,8 @@ class Tree:
     @cached_property
     def plain(self) -> bool:
         """Whether the joint speeds are the generalized speeds themselves."""
-        return self.D.shape[0] == self.D.shape[1] and bool(np.all(np.asarray(np.eye(len(self.w), dtype=int) == self.D)))
+        square = self.D.shape[0] == self.D.shape[1]
+        return square and all(own == {k} for k, own in enumerate(self.drivers)) and bool(np.all(np.diagonal(self.D) == 1))
 
     def by_speeds(self, rows: np.ndarray) -> np.ndarray:
         """rows D: what rows (n, n_w) along the joints' speeds are along the generalized ones, (n, n_u)."""
@@ -219,7 +220,7 @@ class _Builder:
         self.w: list[Any] = []
         self.w_t: list[Any] = []
         self.b: list[Any] = []
-        self.rows: list[list[Any]] = []
+        self.rows: list[dict[int, Any]] = []
 
     def tree(self) -> Tree:
         model, a = self.model, self.algebra
@@ -238,7 +239,9 @@ class _Builder:
         if self.aligned:
             self._align()
         links = tuple(self._link(k) for k in range(len(self.parts)))
-        D = np.array(self.rows, dtype=object).reshape(len(self.w), len(model.speeds))
+        D = zeros(len(self.w), len(model.speeds))
+        for k, row in enumerate(self.rows):
+            D[k, list(row)] = list(row.values())
         worked = tuple(self._worked(p) for p in poses)
         return Tree(model, a, links, worked, self._worked(ground), D, vector(*self.w), vector(*self.w_t), vector(*self.b),
                     self.rates, self._added(worked), self._flexible(links, worked),
@@ -271,28 +274,26 @@ class _Builder:
     def _joint_speeds(self, joint: Joint) -> tuple[list[Any], list[Any]]:
         """Coordinates and speeds of the joint; extends w = D u + w_t and its derivative."""
         a = self.algebra
-        n_u = len(self.model.speeds)
         s = [a.leaves[q] if isinstance(q, Coordinate) else a.expression(q) for q in joint.coordinates]
         symbols = joint_speeds(joint)
         w: list[Any] = []
         for k, symbol in enumerate(symbols):
-            row: list[Any] = [0] * n_u
             if symbol is not None and symbol in self.indices:
-                row[self.indices[symbol]] = 1
+                row = {self.indices[symbol]: 1}
                 w.append(a.leaves[symbol])
                 self.w_t.append(0)
                 self.b.append(0)
             elif symbol is not None and symbol in self.model.own_speeds:
                 speed = a.leaves[symbol]
                 leaves = [a.leaves[u] for u in self.model.speeds]
-                row = [forward(a.recorder, [speed], {u: 1})[0] for u in leaves]
+                row = dict(enumerate(forward(a.recorder, [speed], {u: 1})[0] for u in leaves))
                 w.append(speed)
                 self.w_t.append(substitute((speed,), dict.fromkeys(leaves, 0), a.recorder)[0])
                 self.b.append(forward(a.recorder, [speed], a.by_time(self.model.coordinates, self.rates))[0])
             else:
                 by_time = a.by_time(self.model.coordinates, self.rates)
                 speed = forward(a.recorder, [s[k]], by_time)[0]
-                row = [forward(a.recorder, [speed], {a.leaves[u]: 1})[0] for u in self.model.speeds]
+                row = dict(enumerate(forward(a.recorder, [speed], {a.leaves[u]: 1})[0] for u in self.model.speeds))
                 w.append(speed)
                 self.w_t.append(forward(a.recorder, [s[k]], given_by_time(a.leaves))[0])
                 self.b.append(forward(a.recorder, [speed], by_time)[0])
