@@ -124,6 +124,23 @@ def test_lemke_finds_what_the_enumeration_finds_in_a_plane(n: int, monkeypatch: 
     assert missed <= 3  # friction of contacts that slip leaves matrices that are not copositive
 
 
+def test_two_legs_in_space_hold_what_their_cones_can() -> None:
+    """A body of mass and inertia 1 on legs at x = 1 and x = -1, pushed by nearly its weight times mu, a height above them: loads
+    follow from the moment about y, forces along y are alike since nothing turns about z, and those along x are what is left of
+    the cones."""
+    mu, height, points = 0.5, 0.1, ((1.0, 0.0, -0.1), (-1.0, 0.0, -0.1))
+    J = np.array([np.concatenate([e, np.cross(point, e)]) for point in points for e in np.eye(3)[[2, 0, 1]]])
+    sites = [Site((0, 1, 2), mu, mu), Site((3, 4, 5), mu, mu)]
+    for angle, part in product(np.linspace(0, 2 * np.pi, 25)[:-1], (0.93, 0.995)):
+        push = part * mu * np.array([np.cos(angle), np.sin(angle)])
+        loads = 0.5 + height * push[0] / 2 * np.array([1, -1])
+        assert np.sqrt((mu * loads)**2 - (push[1] / 2)**2).sum() > abs(push[0])
+        found = solutions(J @ J.T, J @ [*push, -1, 0, 0, 0], sites)
+        assert found and [mode.kind for mode in found[0].modes] == [STICKING, STICKING], angle
+        fulfils(J @ J.T, J @ [*push, -1, 0, 0, 0], sites, found[0])
+        assert found[0].lam[[0, 3]] == pytest.approx(loads, rel=1e-9)
+
+
 def test_what_static_friction_holds_does_not_begin_to_slide() -> None:
     """Between the bounds of kinetic and of static friction a contact sticks, and so does a joint with dry friction."""
     contact, joint = Site((0, 1), 0.5, 0.3), Site((0,), 2.0, 1.0, bounded=True)
