@@ -98,6 +98,17 @@ JOINTS: dict[str, tuple[Make, Any, Any]] = {
 }
 
 
+def test_joints_stand_in_the_order_in_which_they_were_added_where_parents_come_first() -> None:
+    """Two links in a row, then one beside the first; with a joint that is added before its parent's the order is by depth."""
+    for added, wanted in (("ABC", "ABC"), ("BAC", "ACB")):
+        s = sd.System("order")
+        bodies = {name: s.add_body(name, mass=1, inertia=[1, 1, 1]) for name in "abc"}
+        for name in added:
+            parent = bodies["a"] if name == "B" else s.ground
+            s.add_joint(sd.Revolute(name, parent, bodies[name.lower()]))
+        assert "".join(s.embedding().compile(backend="numpy").simulate((0, 0.1)).reactions) == wanted
+
+
 def mechanism(name: str, moving: bool = True, place: dict | None = None) -> EmbeddedEquations:
     """A body on the joint, on a base that slides and turns about a skew axis (or on the ground)."""
     s = sd.System("mechanism", gravity=[0, 0, -9.81])
