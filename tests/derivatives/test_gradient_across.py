@@ -82,6 +82,18 @@ def falling(quantity: Any = None, **event: Any) -> Any:
     return system.embedding().compile()
 
 
+def test_an_integrand_that_jumps_with_the_time_of_an_event() -> None:
+    """y from when a switch is thrown at t = T on, of a mass that moves at 1 m/s: (4 - T^2)/2."""
+    y, T = sd.coordinates("y"), sd.parameters("T")
+    system = sd.System("switched")
+    system.add_joint(sd.Prismatic("slide", system.ground, system.add_body("mass", mass=1), y, axis=[1, 0]))
+    system.add_event("thrown", sd.t - T, reset={y.dot: y.dot + T - sd.t})
+    system.defaults, system.initial = {T: 0.75}, {y.dot: 1.0}
+    loss = sd.Loss(integral=sp.Piecewise((y, sd.t > T), (0, True)))
+    found = system.compile().gradient(loss, ["T"], (0, 2))
+    assert found.value == pytest.approx((4 - 0.75**2) / 2, abs=1e-9) and found["T"] == pytest.approx(-0.75, abs=1e-6)
+
+
 def test_where_an_event_ends_the_motion() -> None:
     """The time of the end moves, too: t y_dot is -2 h there, and the integral of y is 2/3 h sqrt(2 h/g)."""
     y, names = sd.coordinates("y"), ["g", "y(0)"]
