@@ -128,6 +128,14 @@ def test_a_rod_jams_from_four_thirds_on():
     assert seen == {(1, False), (1, True), (0, True), (2, True)}
 
 
+@pytest.mark.parametrize("angle", (0.3, 0.8, np.arctan(2), 1.4))
+def test_a_rod_at_the_very_border_jams(angle):
+    """Where a determinant is zero but for rounding, numbers would be rounding alone."""
+    friction = (1 + 3 * np.cos(angle)**2) / (3 * np.sin(angle) * np.cos(angle))
+    with pytest.raises(EvaluationError, match=r"depend on reaction\(guide\)\[1\] have no solution or more than one"):
+        rod(backend="numpy").outputs(0, [0, angle, 1.0, 0.0], {"mu": friction})
+
+
 @pytest.mark.parametrize("backend", ("numpy", "c"))
 @pytest.mark.parametrize("friction", (1.34, 1.5, 2.0))
 def test_a_run_stops_where_the_rod_jams(friction, backend):
