@@ -102,6 +102,15 @@ def test_a_motion_backward_ends_its_steps_at_the_same_times(backend: str) -> Non
     np.testing.assert_allclose(found.q[::-1, 0], moved(force), rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize("span", [(0.0, 1000.0), (1000.0, 0.0), (-1000.0, 0.0)])
+def test_no_step_ends_within_rounding_of_an_end(span: tuple[float, float]) -> None:
+    """A table has a kink a unit in the last place before an end, as where times are sums."""
+    kink = np.nextafter(1000.0, 0.0) * np.sign(sum(span))
+    times = np.sort([-2000.0, kink, 2000.0])
+    found = pushed("numpy").simulate(span, inputs={"F": (times, [0.0, 1.0, 0.0])}, steps=True)
+    assert found.success and np.abs(np.diff(found.t)).min() > 1e-9
+
+
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 def test_a_road_of_many_points_takes_little_more_than_a_step_for_each(backend: str) -> None:
     """A step of order 8 has 12 evaluations; across kinks it took ten times as many steps."""
