@@ -162,6 +162,7 @@ SPATIAL: dict[str, Case] = {
                     "joint 'wrist' depends on q1|must be constant"),
     "one axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0]]),
                  "joint 'wrist' (universal) takes 2 axes, found [[1, 0, 0]]"),
+    "three axes": (lambda s: joined(s, sd.Universal, [q3, q4], axes=np.eye(3)), "joint 'wrist' (universal) takes 2 axes, found "),
     "axes None": (lambda s: joined(s, sd.Universal, [q3, q4], axes=None), "joint 'wrist' (universal) takes 2 axes, found None"),
     "second axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0], [0, 0, 0]]),
                     "second axis [0, 0, 0] has length 0"),
