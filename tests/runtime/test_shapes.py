@@ -120,7 +120,9 @@ def test_edges_of_a_box_with_a_hole_are_its_own_and_no_seams() -> None:
 
 
 def test_a_blade_lies_along_its_direction() -> None:
-    (blade,) = parts(S.Blade([0, 0, 0], [0, 0, 10], [2, 1], direction=[1, 0, 0.3], thickness=0.1))
+    (blade,) = parts(S.Blade([0, 3, 1], [0, 3, 11], [2, 1], direction=[1, 0, 0.3], thickness=0.1))
+    sections = blade.vertices[:10], blade.vertices[10:20]
+    np.testing.assert_allclose([section.mean(axis=0) for section in sections], [[0, 3, 1], [0, 3, 11]], atol=1e-12)
     assert np.ptp(blade.vertices[:10, 0]) == pytest.approx(2) and np.ptp(blade.vertices[:10, 1]) < 0.2
     assert np.ptp(blade.vertices[10:, 0]) == pytest.approx(1)
 
