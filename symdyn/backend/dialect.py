@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -237,12 +238,7 @@ def identifier(name: str, taken: set[str]) -> str:
     base = re.sub(r"\W", "_", name, flags=re.ASCII) or "v"
     if base[0].isdigit() or base.startswith("_"):
         base = f"v{base}"
-    candidate = base
-    number = 2
-    while candidate in RESERVED or candidate in taken:
-        candidate = f"{base}_{number}" if candidate != base else f"{base}_"
-        if candidate in taken:
-            candidate = f"{base}_{number}"
-            number += 1
-    taken.add(candidate)
-    return candidate
+    candidates = chain((base, f"{base}_"), (f"{base}_{number}" for number in count(2)))
+    result = next(candidate for candidate in candidates if candidate not in RESERVED and candidate not in taken)
+    taken.add(result)
+    return result

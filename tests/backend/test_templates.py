@@ -316,3 +316,5 @@ def test_identifiers() -> None:
     assert written[0] == "q1" and len(set(written)) == len(names)
     assert all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) for name in written)
     assert not {"lambda", "x", "let", "main"} & set(written)
+    assert [identifier("k", taken) for _ in range(5)] == ["k", "k_", "k_2", "k_3", "k_4"]
+    assert [identifier("while", taken) for _ in range(3)] == ["while_", "while_2", "while_3"]
