@@ -277,6 +277,14 @@ def test_what_does_not_fit_is_rejected() -> None:
         sd.systems.pendulum().compile().simulate((0, 1), method="moreau", step=1e-3)
     with pytest.warns(SimulationWarning, match="20 steps were done, as asked"):
         assert len(module.simulate((0, 1), q=[1.0], method="moreau", step=1e-2, max_steps=20).t) == 21
+    system, body, x = slider("counted")
+    system.add_contact(sd.Contact("sole", body, system.ground))
+    system.add_event("early", x + 1)
+    system.add_event("late", x - 1)
+    counted = system.compile()
+    with pytest.raises(ArgumentError, match="method='moreau' does not locate events, such as late; pass events=False"):
+        counted.simulate((0, 1), u=[1.0, 0.0], method="moreau", step=1e-2, events="late")
+    assert counted.simulate((0, 1), u=[1.0, 0.0], method="moreau", step=1e-2, events=False).success
     numpy = sd.systems.pendulum().compile(backend="numpy")
     with pytest.raises(ArgumentError, match="method='moreau' steps in compiled C; this module runs on numpy"):
         numpy.simulate((0, 1), method="moreau", step=1e-3)

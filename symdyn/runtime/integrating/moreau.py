@@ -88,7 +88,7 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
                             f"{shown(stabilization)}")
     if request.max_step or request.first_step:
         raise ArgumentError(f"{name}: method='moreau' has steps of one length; pass it as step, not as max_step or first_step")
-    wanted = [e.name for e, look in zip(metadata.events, request.look if request.look is not None else (), strict=False) if look]
+    wanted = [] if request.look is None else [metadata.events[k].name for k in np.flatnonzero(request.look)]
     if wanted:
         raise ArgumentError(f"{name}: method='moreau' does not locate events, such as {wanted[0]}; pass events=False, or another "
                             "method")
