@@ -32,7 +32,6 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.simulate import (
-    RTOL,
     check_fits,
     checked_method,
     checked_positive,
@@ -64,12 +63,10 @@ class BatchMotions(ctypes.Structure):
     _fields_ = fields_of("runtime/batch_type.h")
 
 
-def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
-                   inputs: Any = None, rtol: float = RTOL, atol: Any = None, max_step: float = 0.0,
-                   first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
-                   events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                   extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True,
-                   device: Any = "cpu", precision: Any = "double") -> BatchSolution:
+def simulate_batch(module: Module, q: Any, u: Any, params: Any, *, z: Any, t: Any, inputs: Any, rtol: float, atol: Any,
+                   max_step: float, first_step: float, method: Any, max_steps: int | None, stabilization: Any, events: Any,
+                   event_spacing: float, interpolation: str, extend: str, sensitivities: Any, sensitivity_control: bool,
+                   device: Any, precision: Any) -> BatchSolution:
     """See Module.simulate_batch."""
     metadata = module.metadata
     gpu = device_number(device, module.name)

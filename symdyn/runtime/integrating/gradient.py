@@ -30,7 +30,6 @@ from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.quadrature import Integral
 from symdyn.runtime.integrating.sensitivities import Asked, gathered, unseen_jumps
 from symdyn.runtime.integrating.simulate import (
-    RTOL,
     checked_positive,
     checked_times,
     checked_tolerances,
@@ -89,10 +88,9 @@ class Gradient(Mapping[Any, float]):
         return f"<Gradient of a loss of {self.value:.9g} by {len(self.names)} numbers, {self.n_steps} steps>"
 
 
-def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *,
-             z: Any = None, inputs: Any = None, rtol: float = RTOL, atol: Any = None, method: Any = None, max_step: float = 0.0,
-             first_step: float = 0.0, stabilization: Any = None, events: Any = True, interpolation: str = "linear",
-             extend: str = "error") -> Gradient:
+def gradient(module: Module, loss: Any, by: Any, t: Any, q: Any, u: Any, params: Any, *, z: Any, inputs: Any, rtol: float,
+             atol: Any, method: Any, max_step: float, first_step: float, stabilization: Any, events: Any, interpolation: str,
+             extend: str) -> Gradient:
     """See Module.gradient."""
     begun = clock.perf_counter()
     metadata = module.metadata
