@@ -217,6 +217,20 @@ def test_what_passes_zero_as_another_event_stops_it_has_passed() -> None:
         assert run.x[-1] == pytest.approx([1.5, 1.0], rel=1e-7)
 
 
+def test_reset_of_euler_parameters_to_zeros_is_rejected() -> None:
+    """No unit vector is near them."""
+    s = sd.System("turned")
+    e = sd.coordinates("e0 e1 e2 e3")
+    s.add_joint(sd.Spherical("ball", s.ground, s.add_body("top", mass=1, inertia=[1, 2, 3]), e, sd.EulerParameters()))
+    s.add_event("lost", sd.t - 0.5, reset={e[0]: 0})
+    equations = s.embedding()
+    for backend, method in METHODS[:4]:
+        with pytest.warns(sd.SimulationWarning, match="stopped at t = 0.5: the constraints do not let e0 be what the reset of an "
+                                                      "event makes it: the nearest is 1 off"):
+            run = equations.compile(backend=backend).simulate((0, 1), method=method)
+        assert not run.success and run.t[-1] == pytest.approx(0.5)
+
+
 def test_event_at_the_very_end_of_a_step() -> None:
     y = sd.coordinates("y")
     s = sd.System("falling", gravity=[0, -10])

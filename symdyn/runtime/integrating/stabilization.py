@@ -122,6 +122,9 @@ class Projector:
         Raises ProjectionFailed, also where the constraints do not let an entry be what its reset makes it.
         """
         x = np.array(x, dtype=float)
+        for group in self.groups:
+            if not x[group].any():  # zeros have no direction
+                raise ProjectionFailed(reset_rejected(self.module.metadata.x[group[0]], 1.0))
         self._normalise(x)
         middle = self.n_q + self.n_u
         if not self.n_c or not any(k < middle for k in held):
@@ -197,9 +200,7 @@ class Projector:
 
     def _normalise(self, x: np.ndarray) -> None:
         for group in self.groups:
-            norm = np.linalg.norm(x[group])
-            if norm > 0:
-                x[group] /= norm
+            x[group] /= np.linalg.norm(x[group])
 
     def _correct(self, t: float, x: np.ndarray) -> None:
         """Corrections until residuals are at rounding level, or shrink no further."""

@@ -314,6 +314,17 @@ static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double
                 for (int i = 0; i < SYMDYN_HELD; i++) asked[i] |= symdyn_held[i] == symdyn_reset_index[r];
 #endif
             }
+#if SYMDYN_HAS_UNIT_GROUPS
+    for (int group = 0; group < SYMDYN_UNIT_GROUPS; group++) {  // zeros have no direction
+        const int *const index = symdyn_unit_groups[group];
+        double most = 0.0;
+        for (int k = 0; k < SYMDYN_UNIT_SIZE && index[k] >= 0; k++) most = fmax(most, fabs(after[index[k]]));
+        if (most == 0.0) {
+            run->events.reset_gap = 1.0;
+            return symdyn_fail(run, SYMDYN_RESET_REJECTED, 0, index[0], t, x);
+        }
+    }
+#endif
 #endif
 #if SYMDYN_KEEPS_RESETS
 #if SYMDYN_SENSITIVE

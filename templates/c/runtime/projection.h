@@ -10,7 +10,7 @@ SYMDYN_LINKED void symdyn_normalise(double *x) {
         const int *const index = symdyn_unit_groups[group];
         double square = x[index[0]] * x[index[0]];
         for (int k = 1; k < SYMDYN_UNIT_SIZE && index[k] >= 0; k++) square += x[index[k]] * x[index[k]];
-        const double factor = square > 0.0 ? 1.0 / sqrt(square) : 1.0;
+        const double factor = 1.0 / sqrt(square);
         for (int k = 0; k < SYMDYN_UNIT_SIZE && index[k] >= 0; k++) x[index[k]] *= factor;
     }
 }
