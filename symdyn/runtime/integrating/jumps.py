@@ -201,7 +201,7 @@ class Several:
 
     def _jumps_alone(self, k: int, events: Sequence[int]) -> bool:
         """Whether the right-hand side jumps at one of the events."""
-        slope = self._between(self.x, {other: 1 if other == k else -1 for other in events})
+        slope = self._between(self.x, {other: other == k for other in events})
         return slope is None or _differ(self.slope, slope)
 
     def _ordered(self, order: Sequence[int]) -> list[Jump] | None:
@@ -210,8 +210,8 @@ class Several:
         for number, k in enumerate(order):
             jump = self._jump(x, slope, (k,))
             jump.after = jump.go_on(x.copy())
-            sides = {other: 1 if index <= number else -1 for index, other in enumerate(order)}
-            then = self._between(jump.after, sides) if number + 1 < len(order) else None
+            over = {other: index <= number for index, other in enumerate(order)}
+            then = self._between(jump.after, over) if number + 1 < len(order) else None
             if then is None and number + 1 < len(order):
                 return None
             jump.slope_after = self.field.one_sided(self.t, jump.after, self.side) if then is None else then
@@ -219,16 +219,16 @@ class Several:
             jumps.append(jump)
         return jumps
 
-    def _between(self, x: np.ndarray, sides: dict[int, int]) -> np.ndarray | None:
-        """The slope at a state where quantities of some events, 1, have gone over, and those of others, -1, have not yet: along
-        the nearest way to that side. None: there is none."""
-        g_x, g_t, _ = self._jump(x, self.slope, tuple(sides)).derivatives("events")
-        rows = np.column_stack([g_t, g_x])[list(sides)]
+    def _between(self, x: np.ndarray, over: dict[int, bool]) -> np.ndarray | None:
+        """The slope at a state where quantities of some events have gone over, and those of others not yet: along the nearest way
+        to that side. None: there is none."""
+        g_x, g_t, _ = self._jump(x, self.slope, tuple(over)).derivatives("events")
+        rows = np.column_stack([g_t, g_x])[list(over)]
         lengths = np.linalg.norm(rows, axis=1)
         if not lengths.all() or np.linalg.svd(rows / lengths[:, None], compute_uv=False)[-1] < APART:
             return None
         before = np.concatenate([[1.0], self.slope])
-        waiting = np.array([side < 0 for side in sides.values()])
+        waiting = ~np.array(list(over.values()))
         slope = far = self.field(self.t, x)
         for part in (2, 1):
             far = slope
