@@ -74,10 +74,9 @@ def _since(kinds: np.ndarray) -> np.ndarray:
 
 def _lengths(since: np.ndarray, first: int, end: int) -> list[int]:
     """The most frequent distances among the steps from first to end, ascending."""
-    lengths, counts = np.unique(since[first:end], return_counts=True)
-    counts = np.where(lengths > 0, counts, 0)
-    chosen = np.argsort(-counts, kind="stable")[:_LENGTHS]
-    return sorted(lengths[chosen][counts[chosen] > 0].tolist())
+    within = since[first:end]
+    lengths, counts = np.unique(within[within > 0], return_counts=True)
+    return sorted(lengths[np.argsort(-counts, kind="stable")[:_LENGTHS]].tolist())
 
 
 def _best(kinds: np.ndarray, first: int, end: int, lengths: Sequence[int], begins: np.ndarray) -> Loop | None:

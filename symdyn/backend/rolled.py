@@ -460,7 +460,7 @@ class _LoopWriter:
         body = [f"    {line}" for line in lines]
         section = Section("", (self.words.begin.format(n=loop.trips), *body, self.words.end, *self.after))
         return Part(tuple(g for g in ARGUMENTS if g in writer.groups), tuple(self.before), (section,), (),
-                    any(isinstance(s, _Store) and s.op == "store" for s in steps), loop.trips)
+                    any(s.op == "store" for s in steps), loop.trips)
 
     def _step(self, r: int, carried: bool) -> list[str]:
         """The statements of a step that computes something; what is read after the loop only is kept after it."""

@@ -209,7 +209,7 @@ class Gathered:
             return False
         what = row.value if row.holonomic else row.rate
         mask = what.mask if isinstance(what, Node) else 0
-        if mask & ~(TIME | INPUT | PARAMETER) and np.ptp(numbers[:, 0]) > ROUNDING:
+        if np.ptp(numbers[:, 0]) > ROUNDING:
             self.faults.append(f"{row.name} holds nothing: its derivatives by all coordinates and speeds vanish at every state; "
                                "remove it, or correct it")
         elif mask & (TIME | INPUT):

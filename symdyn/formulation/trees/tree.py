@@ -267,7 +267,7 @@ class _Builder:
         speeds = range(len(self.w) - len(w), len(self.w))
         name = joint.child if isinstance(joint.child, str) else joint.child.name
         self.parts.append(_Part(name, joint, parent.link, R0, parent.point(a.constants(joint.parent_point)), motion,
-                                s[0] if s else 0, speeds, Inertia.none(), Inertia.none()))
+                                s[0] if s else None, speeds, Inertia.none(), Inertia.none()))
         back = (a.matrix(joint.child_rotation) @ a.matrix(A)).T
         return Pose(number, back, -(back @ a.constants(joint.child_point)))
 

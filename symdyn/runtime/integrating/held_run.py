@@ -205,11 +205,10 @@ class _Pieces:
 
     def _whole(self, message: str, cause: BaseException | None, interrupted: bool, over: bool) -> Outcome:
         """All pieces as one; over: an event at a jump ended the motion."""
-        width = len(self.request.x0)
         t = np.concatenate(self.ts) if self.ts else np.array(self.request.span[:1])
         x = np.concatenate(self.xs) if self.xs else self.request.x0[None, :].copy()
         if not self.done:
-            return Outcome(t, x.reshape(-1, width), False, message, interrupted, 0, 0, 0, cause=cause)
+            return Outcome(t, x, False, message, interrupted, 0, 0, 0, cause=cause)
         last = self.done[-1]
         if message and len(last.t) and (not len(t) or last.t[-1] > t[-1]):  # stopped at an instant that is no output time
             t, x = np.append(t, last.t[-1]), np.vstack([x, last.x[-1:]])
