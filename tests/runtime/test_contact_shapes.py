@@ -264,31 +264,47 @@ def test_a_road_keeps_the_energy_of_what_slides_on_it_and_its_module_travels() -
     assert np.abs(solution.contacts["touch"].gap[closed]).max() < 1e-9
 
 
+def on_a_cam(pair: Any) -> sd.System:
+    """A roller that moves freely in the plane, and a cam that turns."""
+    system = sd.System("cam", gravity=[0, -9.81])
+    roller, cam = (system.add_body(name, mass=1.0, inertia=inertia) for name, inertia in (("roller", 0.016), ("cam", 0.1)))
+    system.add_joint(sd.Planar("free", system.ground, roller, sd.coordinates("x y theta")))
+    system.add_joint(sd.Revolute("turn", system.ground, cam, sd.coordinates("phi")))
+    system.add_contact(sd.Contact("touch", roller, cam, shape=pair, friction=0.3, restitution=0.2))
+    return system
+
+
+OFF, SIZE = 0.1, 0.5
+ECCENTRIC = OFF * sp.cos(X) + sp.sqrt(SIZE**2 - OFF**2 * sp.sin(X)**2)
+
+
+@pytest.mark.parametrize(("shape", "reach"), [(Shapes.Point(), 0.0), (SPHERE, 0.2)])
+def test_the_gap_above_a_cam_is_the_distance_to_first_order(shape: Any, reach: float) -> None:
+    module = on_a_cam((shape, Shapes.Cam(ECCENTRIC, X))).compile(backend="numpy")
+    for angle in np.linspace(0, 6, 7):
+        away, phi = SIZE + reach + 1e-5, 0.3
+        x, y = OFF * np.cos(phi) + away * np.cos(angle), OFF * np.sin(phi) + away * np.sin(angle)
+        assert module.evaluate("contact_gaps", 0.0, [x, y, 0, phi, 0, 0, 0, 0])[0] == pytest.approx(1e-5, rel=1e-3)
+
+
 def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
     """A roller and a point on a cam that turns, given by an expression and as a periodic spline, against a circle."""
-    off, size = 0.1, 0.5
-    radius = off * sp.cos(X) + sp.sqrt(size**2 - off**2 * sp.sin(X)**2)
     turn = np.linspace(0, 2 * np.pi, 201)
-    values = sp.lambdify(X, radius)(turn)
+    values = sp.lambdify(X, ECCENTRIC)(turn)
     values[-1] = values[0]
     spline = CubicSpline(turn, values, bc_type="periodic")
     start: dict[str, Any] = {"q": {"x": 0.05, "y": 1.0, "phi": 0.3}, "u": {"phi_dot": 2.0}, "rtol": 1e-9}
 
     def motion(pair: Any) -> np.ndarray:
-        system = sd.System("cam", gravity=[0, -9.81])
-        roller, cam = (system.add_body(name, mass=1.0, inertia=inertia) for name, inertia in (("roller", 0.016), ("cam", 0.1)))
-        system.add_joint(sd.Planar("free", system.ground, roller, sd.coordinates("x y theta")))
-        system.add_joint(sd.Revolute("turn", system.ground, cam, sd.coordinates("phi")))
-        system.add_contact(sd.Contact("touch", roller, cam, shape=pair, friction=0.3, restitution=0.2))
-        solution = system.embedding().compile().simulate((0, 0.6), **start)
+        solution = on_a_cam(pair).embedding().compile().simulate((0, 0.6), **start)
         assert [mode for _, mode in solution.contacts["touch"].switches] == ["open", "sticking"]
         return np.asarray(solution.x)
 
-    circle = Shapes.Sphere(size, [off, 0])
+    circle = Shapes.Sphere(SIZE, [OFF, 0])
     rolls = motion((SPHERE, circle))
-    assert np.abs(motion((SPHERE, Shapes.Cam(radius, X))) - rolls).max() < 1e-8
+    assert np.abs(motion((SPHERE, Shapes.Cam(ECCENTRIC, X))) - rolls).max() < 1e-8
     assert np.abs(motion((SPHERE, Shapes.Cam(spline, X))) - rolls).max() < 2e-6  # of the interpolation
-    assert np.abs(motion((Shapes.Point(), Shapes.Cam(radius, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
+    assert np.abs(motion((Shapes.Point(), Shapes.Cam(ECCENTRIC, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
 
 
 TYRE = Shapes.Torus(0.15, 0.05)
@@ -320,8 +336,7 @@ def test_shapes_deep_in_a_surface_move_as_in_the_bowl_that_it_is(shape: Any) -> 
 
 @pytest.mark.sweep
 def test_a_circle_deep_in_a_cam_moves_as_in_the_eccentric_circle_that_it_is() -> None:
-    radius = 0.1 * sp.cos(X) + sp.sqrt(0.25 - 0.01 * sp.sin(X)**2)
-    pairs = [(SPHERE, Shapes.Cam(radius, X)), (SPHERE, Shapes.Sphere(0.5, [0.1, 0]))]
+    pairs = [(SPHERE, Shapes.Cam(ECCENTRIC, X)), (SPHERE, Shapes.Sphere(SIZE, [OFF, 0]))]
     runs = [wheel(pair, **SOFT).simulate((0, 0.6), q=[0.05, 1.0, 0], rtol=1e-11) for pair in pairs]
     assert runs[1].contacts["touch"].gap.min() < -0.03
     assert np.abs(runs[0].x - runs[1].x).max() < 1e-8
