@@ -307,6 +307,17 @@ def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
     assert np.abs(motion((Shapes.Point(), Shapes.Cam(ECCENTRIC, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
 
 
+@pytest.mark.parametrize("shape", [Shapes.Point(), SPHERE])
+def test_the_gap_above_a_cam_is_the_distance_to_first_order(shape: Any) -> None:
+    """All around an eccentric circle, whose normal is up to 37 degrees away from the way to the axis of the cam."""
+    off, size, distance = 0.3, 0.5, 1e-4
+    module = wheel((shape, Shapes.Cam(off * sp.cos(X) + sp.sqrt(size**2 - off**2 * sp.sin(X)**2), X)))
+    away = size + distance + (0.2 if shape == SPHERE else 0)
+    for angle in np.linspace(0, 2 * np.pi, 12):
+        x = np.array([off + away * np.cos(angle), away * np.sin(angle), 0, 0, 0, 0])
+        assert numbers(module, 0.0, x, module.default_parameters, ()).gap[0] == pytest.approx(distance, rel=1e-3)
+
+
 TYRE = Shapes.Torus(0.15, 0.05)
 SOFT: dict[str, Any] = {"law": "compliant", "friction": 0.3,
                         "compliance": Shapes.Compliance(2000.0, dissipation=0.2, located=True)}
