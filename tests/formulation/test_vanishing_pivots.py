@@ -12,10 +12,9 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import EvaluationError
-from symdyn.formulation.probes.vanishing_pivots import vanishing_pivots
+from symdyn.formulation.probes.vanishing_pivots import Search, vanishing_pivots
 from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
 from symdyn.formulation.textbook.numbers import NumericTree
-from symdyn.formulation.trees import tree as trees
 from symdyn.formulation.trees.equations import tree_of
 from symdyn.functions.tapes import function_tape
 from symdyn.model.orientation import SEQUENCES
@@ -175,11 +174,10 @@ def test_custom_joints_may_lock() -> None:
 
 def added(system: sd.System, form: str, monkeypatch: pytest.MonkeyPatch, quantity: str = "rhs") -> int:
     """Operations more than without the check."""
-    counts = []
-    for way in (vanishing_pivots, lambda tree, solid=False: {}):
-        monkeypatch.setattr(trees, "vanishing_pivots", way)
-        counts.append(function_tape(getattr(system, form)(), quantity).operations)
-    return counts[0] - counts[1]
+    checked = function_tape(getattr(system, form)(), quantity).operations
+    with monkeypatch.context() as patch:
+        patch.setattr(Search, "vanishing_pivots", lambda search: {})
+        return checked - function_tape(getattr(system, form)(), quantity).operations
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -198,6 +196,36 @@ def test_nothing_for_links_with_mass_and_one_freedom_each(name: str, monkeypatch
 def test_of_dependent_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
     assert added(get("rolling_disc"), "augmented", monkeypatch) == 2
     assert 2 <= added(get("double_wishbone"), "augmented", monkeypatch) <= 6
+
+
+# -- speeds that cannot lock
+
+
+def chain(*inertias: Any) -> sd.System:
+    """Links on universal joints, with inertias of their own; None: a point."""
+    s = sd.System("chain", gravity=[0, 0, -9.81])
+    before: Any = s.ground
+    for k, inertia in enumerate(inertias):
+        link = s.add_body(f"link{k}", mass=2, inertia=inertia, com=[0.4, 0, 0])
+        s.add_joint(sd.Universal(f"joint{k}", before, link, sd.coordinates(f"a{k} b{k}"), axes=(Y, Z), parent_point=[1, 0, 0]))
+        before = link
+    return s
+
+
+def test_links_that_are_alike_are_tried_once() -> None:
+    a, b, c = sd.parameters("a b c")
+    for inertias, tried in ((([a, b, b],) * 5, 1), (([a, b, b], [b, c, c]), 1), (([a, b, b], [a, a, b]), 2),
+                            (([a, b, b], [a, b, c], [b, c, c]), 2), (([1, 2, 2], [1, 3, 3], [1, 2, 2]), 2)):
+        search = Search(tree_of(chain(*inertias).check(), "body"))
+        assert not search.vanishing_pivots()
+        assert search.sound == set(range(2 * len(inertias)))
+        assert len(search._tried) == tried
+
+
+def test_a_link_among_others_that_are_alike_may_lock() -> None:
+    """A point has a pole where it lies along the first axis of its joint."""
+    assert found(chain([1, 2, 2], [1, 2, 2], None)) == ["a2_dot"]
+    assert found(chain([1, 2, 2], [1, 2, 2], [1, 2, 2])) == []
 
 
 # -- states that are rejected

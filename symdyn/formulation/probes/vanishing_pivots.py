@@ -8,6 +8,8 @@ A motion without kinetic energy moves no link in a direction in which it has mas
 velocity, and the part of it that the speeds after it do not explain, have the same size at every position; it may lock if these
 sizes change, or if at every single link the speeds after it always explain it, so that only several links together do not. Links
 with mass that have one freedom each are seen at once.
+
+Links whose joints and inertias are alike but for the names of their symbols are tried once.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from symdyn.model.orientation import EulerParameters
 from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import cross, inner
 from symdyn.tape.evaluate import evaluate
-from symdyn.tape.node import is_zero
+from symdyn.tape.node import Node, is_zero
 from symdyn.tape.quick import evaluate_quickly
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape
@@ -44,7 +46,7 @@ def vanishing_pivots(tree: Tree, solid: bool = False) -> dict[int, frozenset[int
     solid   only those that then move no link that has a mass at all, and so no constraint between such links; else links have
             mass in some directions only where they are points or thin rods
     """
-    return _Search(tree, solid).vanishing_pivots()
+    return Search(tree, solid).vanishing_pivots()
 
 
 def massless(tree: Tree, k: int) -> bool:
@@ -97,11 +99,17 @@ def nonzero_indices(row: np.ndarray) -> frozenset[int]:
     return frozenset(np.flatnonzero(row != 0).tolist())  # a node is not equal to a number
 
 
-class _Search:
-    """`alive`: speeds that a motion without kinetic energy may have, as far as is known; those of beams bend them."""
+class Search:
+    """What `vanishing_pivots` asks, link by link.
 
-    def __init__(self, tree: Tree, solid: bool) -> None:
+    alive     speeds that a motion without kinetic energy may have, as far as is known; those of beams bend them
+    sound     speeds that always move a link otherwise than the speeds after them do: their pivots are not zero
+    """
+
+    def __init__(self, tree: Tree, solid: bool = False) -> None:
         self.tree, self.solid = tree, solid
+        self.sound: set[int] = set()
+        self._tried: dict[tuple[Any, ...], np.ndarray] = {}
         self.moving: list[frozenset[int]] = []
         self.own: list[list[frozenset[int]]] = []  # of each link, of each of its joint's speeds
         for link in tree.links:
@@ -110,10 +118,9 @@ class _Search:
             self.moving.append(before.union(*self.own[-1]))
         bending = [tree.drivers[k] for body in tree.flexible for k in body.speeds]
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
-        self.positions = [_Position(tree, k, solid, self.own, self.alive) for k in range(POSITIONS)]
+        self.positions = [_Position(tree, k, solid, self.own, self.moving, self.alive) for k in range(POSITIONS)]
 
     def vanishing_pivots(self) -> dict[int, frozenset[int]]:
-        sound: set[int] = set()
         changing: dict[int, frozenset[int]] = {}
         explained: dict[int, frozenset[int]] = {}
         decided: set[int] = set()
@@ -123,18 +130,18 @@ class _Search:
             if massless(self.tree, k) or not asked:
                 continue
             result = {p: self._sound(k, p, [c for c in speeds if c > p]) for p in asked}
-            sound.update(p for p in asked if result[p])
+            self.sound.update(p for p in asked if result[p])
             after = {p: frozenset(c for c in speeds if c > p) for p in asked}
             changing.update({p: after[p] for p in asked if result[p] is False})
             explained.update({p: after[p] for p in asked if result[p] is None and after[p]})
             if len(asked) == len(speeds) and all(result.values()):
                 self.alive.difference_update(speeds)
-            decided |= sound
+            decided |= self.sound
             # A link that has mass in all directions, and is not moved, moves nothing that hangs on it, either.
             if not decided.issuperset(asked) and len(self.positions[0].directions(k)) == 6:
                 decided.update(asked)
         together = {} if self.solid else explained
-        return {p: after for p, after in {**together, **changing}.items() if p not in sound}
+        return {p: after for p, after in {**together, **changing}.items() if p not in self.sound}
 
     def _sound(self, k: int, p: int, after: Sequence[int]) -> bool | None:
         """Whether speed p always moves link k otherwise than the speeds after it do; None where it never does."""
@@ -144,22 +151,36 @@ class _Search:
                  for entries in link.S]
         if alone and felt(tree, k, np.array(along, dtype=int)):
             return True
-        squares = np.array([position.squares(k, p, after) for position in self.positions])
+        squares = self._squares(k, p, after)
         if (squares < ZERO**2).all(axis=0).any():
             return None
         return bool((squares > ALIKE).all() and (np.ptp(squares, axis=0) < ALIKE * squares[0]).all())
+
+    def _squares(self, k: int, p: int, after: Sequence[int]) -> np.ndarray:
+        """What `_Position.squares` gives at all positions, (POSITIONS, 2)."""
+        link, first = self.tree.links[k], self.positions[0]
+        key: tuple[Any, ...] = (k, p, *after)
+        if not first.carried(k):
+            own, D = first.driven(k)
+            shape = _shape([*link.S.ravel(), *D.ravel(), *[e for part in first.inertia(k) for e in part.ravel()]], first.given)
+            key = (shape, own.index(p), *map(own.index, after))
+        if key not in self._tried:
+            self._tried[key] = np.array([position.squares(k, p, after) for position in self.positions])
+        return self._tried[key]
 
 
 class _Position:
     """A tree at random values of everything that it depends on, the same ones of parameters at all positions; links are evaluated
     when they are first requested.
 
+    own, moving   of each link the speeds of its joint, one by one, and all speeds that move it
     alive   speeds that are still asked about, which get fewer while the links are gone through
+    given   names of what has values of its own
     """
 
     def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = (),
-                 alive: Set[int] = frozenset()) -> None:
-        self.tree, self.solid, self.own, self.alive = tree, solid, own, alive
+                 moving: Sequence[frozenset[int]] = (), alive: Set[int] = frozenset()) -> None:
+        self.tree, self.solid, self.own, self.moving, self.alive = tree, solid, own, moving, alive
         self.stream = random.Random(seed)
         self.parameters = {parameter.name for parameter in tree.model.parameters}
         self.values = dict.fromkeys(tree.idle, 0.0)
@@ -167,6 +188,7 @@ class _Position:
             if isinstance(getattr(joint, "orientation", None), EulerParameters):
                 p = [self.stream.uniform(0.5, 1.5) for _ in range(4)]
                 self.values.update({q.name: e / math.hypot(*p) for q, e in zip(joint.coordinates[-4:], p, strict=True)})
+        self.given = frozenset(self.values)
         self._twists: dict[int, dict[int, np.ndarray]] = {}
         self._directions: dict[int, np.ndarray] = {}
         self._of_inertia: dict[tuple[Any, ...], np.ndarray] = {}  # like bodies have the same nodes
@@ -185,27 +207,42 @@ class _Position:
     def twists(self, k: int) -> dict[int, np.ndarray]:
         """Velocity of link k, at its origin, link axes, (6,), by each speed of its joint, and each one before that is alive."""
         if k not in self._twists:
-            link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
-            own = sorted(frozenset().union(*self.own[k]))
-            R, r, S, D = self.floats(link.R, link.r, link.S, D[:, own])
+            link, (own, D) = self.tree.links[k], self.driven(k)
+            S, D = self.floats(link.S, D)
             result = dict(zip(own, (S @ D).T, strict=True))
-            before = self.twists(link.parent) if link.parent >= 0 else {}
-            for c in self.alive & before.keys():
-                *omega, x, y, z = before[c]
-                carried = np.concatenate([R.T @ omega, R.T @ (np.array([x, y, z]) + np.cross(omega, r))])
-                result[c] = result.get(c, 0) + carried
+            carried = self.carried(k)
+            if carried:
+                R, r = self.floats(link.R, link.r)
+                before = self.twists(link.parent)
+                for c in carried & before.keys():
+                    *omega, x, y, z = before[c]
+                    here = np.concatenate([R.T @ omega, R.T @ (np.array([x, y, z]) + np.cross(omega, r))])
+                    result[c] = result.get(c, 0) + here
             self._twists[k] = result
         return self._twists[k]
+
+    def carried(self, k: int) -> Set[int]:
+        """Those of the speeds before link k that are alive and move it."""
+        parent = self.tree.links[k].parent
+        return self.alive & self.moving[parent] if parent >= 0 else frozenset()
+
+    def driven(self, k: int) -> tuple[list[int], np.ndarray]:
+        """The speeds that joint k is made of, and how its own follow from these."""
+        own = sorted(frozenset().union(*self.own[k]))
+        return own, self.tree.D[list(self.tree.links[k].speeds)][:, own]
+
+    def inertia(self, k: int) -> list[np.ndarray]:
+        """Mass, first moment and inertia of link k, and its added mass, in nodes."""
+        inertia, added = self.tree.links[k].inertia, self.tree.added_to(k)
+        parts = [np.array(inertia.m, dtype=object), inertia.h, inertia.I]
+        return parts if added is None else [*parts, added.A, added.H, added.M]
 
     def directions(self, k: int) -> np.ndarray:
         """Those in which link k has mass, (n, 6), orthonormal."""
         if self.solid:
             return np.eye(6)
         if k not in self._directions:
-            inertia, added = self.tree.links[k].inertia, self.tree.added_to(k)
-            parts = [np.array(inertia.m, dtype=object), inertia.h, inertia.I]
-            if added is not None:
-                parts += [added.A, added.H, added.M]
+            parts = self.inertia(k)
             asked = tuple(entry for part in parts for entry in part.ravel())
             if asked not in self._of_inertia:
                 self._of_inertia[asked] = self._in_numbers(parts)
@@ -239,6 +276,23 @@ class _Position:
             elif name not in self.values:
                 self.values[name] = random.Random(name).uniform(0.5, 1.5)
         return tape
+
+
+def _shape(entries: Sequence[Any], named: Set[str]) -> tuple[Any, ...]:
+    """How entries are computed: the same for those that differ in the names of their leaves alone, but for those in `named`."""
+    found = list(dict.fromkeys(e for e in entries if isinstance(e, Node)))
+    numbers = {node: k for k, node in enumerate(found)}
+    for node in found:  # which grows meanwhile
+        for a in node.args:
+            if isinstance(a, Node) and a not in numbers:
+                numbers[a] = len(found)
+                found.append(a)
+
+    def numbered(values: Sequence[Any]) -> list[Any]:
+        return [(numbers[value],) if isinstance(value, Node) else value for value in values]
+
+    return (*numbered(entries), *[(node.mask, node.args[1] in named and node.args[1]) if node.op == "leaf" else
+                                  (node.op, *numbered(node.args)) for node in found])
 
 
 def _floats(values: np.ndarray) -> np.ndarray:
