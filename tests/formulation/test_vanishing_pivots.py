@@ -228,6 +228,28 @@ def test_a_link_among_others_that_are_alike_may_lock() -> None:
     assert found(chain([1, 2, 2], [1, 2, 2], [1, 2, 2])) == []
 
 
+@pytest.mark.parametrize("system", [top(arms=2), chain([1, 2, 2], [1, 2, 2], None), get("spatial_chain"), get("puma560")])
+def test_pivots_of_sound_speeds_are_positive(system: sd.System) -> None:
+    """Even where another one vanishes: what the speeds after each speed leave of its diagonal entry of the mass matrix."""
+    equations = system.embedding()
+    tree = tree_of(system.check(), "body")
+    symbols = equations.symbols
+    stream = np.random.default_rng(3)
+    for _ in range(3):
+        q = {s.name: v for s, v in zip(symbols.coordinates, stream.uniform(-3, 3, len(symbols.coordinates)), strict=True)}
+        locked = {"q_socket_2": RIGHT, "b2": RIGHT}
+        values = {**{s.name: float(v) for s, v in symbols.defaults.items()}, **q, **{k: v for k, v in locked.items() if k in q}}
+        with mpmath.workdps(60):
+            M = mpmath.matrix(evaluate(equations.tape("M_tilde"), values, 60)["M_tilde"].tolist())
+            pivots = []
+            for k in range(len(symbols.speeds)):
+                after = M[k + 1:, k + 1:]
+                left = (M[k, k + 1:] * mpmath.lu_solve(after, M[k + 1:, k]))[0] if after.rows else 0
+                pivots.append(float(M[k, k] - left))
+        assert {k for k, pivot in enumerate(pivots) if pivot > 1e-9} == set(tree.sound)
+        assert set(range(len(pivots))) - tree.sound == set(tree.vanishing_pivots)
+
+
 # -- states that are rejected
 
 

@@ -24,6 +24,7 @@ from symdyn.model.joints import Fixed
 from symdyn.model.record import Model
 from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
+from symdyn.tape.node import is_zero
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,8 +125,11 @@ class RecursiveTree(TreeQuantities):
         if self.own is None:
             super().demand_inertia()
             return
-        speeds = dict(zip(self.own, self.speeds, strict=True))
-        pivots = [(pivot, speeds[index]) for index, pivot in self.articulated().pivots]
+        order = {index: k for k, index in enumerate(self.own)}
+        # A joint is released after all joints behind it, so what is known of the speeds after its own holds for its pivot.
+        sound = self.tree.sound if list(self.own) == sorted(self.own) else ()
+        pivots = [(pivot, self.speeds[order[index]]) for index, pivot in self.articulated().pivots
+                  if is_zero(pivot) or order[index] not in sound]
         demand_pivots(self.model, self.algebra.recorder, pivots)
 
     def reasons(self) -> list[str]:

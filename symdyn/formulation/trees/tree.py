@@ -7,7 +7,7 @@ the links are turned instead, by the sum of the angles, and nothing has to be tu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.identification.joint_regrouping import coordinate_axis, unmoved
-from symdyn.formulation.probes.vanishing_pivots import nonzero_indices, vanishing_pivots
+from symdyn.formulation.probes.vanishing_pivots import Search, nonzero_indices, vanishing_pivots
 from symdyn.formulation.trees.axes import along_coordinate_axis
 from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.water import of_load
@@ -85,6 +85,7 @@ class Tree:
     parallel   number of links whose frames are kept parallel to their parents'
     vanishing_pivots   generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the
                speeds after it that may then move what it moves (see massless_pivots)
+    sound      generalized speeds that always move something that the speeds after them do not move: their pivots are not zero
     """
 
     model: Model
@@ -101,6 +102,7 @@ class Tree:
     flexible: tuple[FlexibleLink, ...] = ()
     parallel: int = 0
     vanishing_pivots: Mapping[int, frozenset[int]] = field(default_factory=dict)
+    sound: Set[int] = frozenset()
 
     @cached_property
     def plain(self) -> bool:
@@ -178,7 +180,8 @@ def build(model: Model, algebra: TapeAlgebra, aligned: bool = False, grouped: bo
     grouped   False: `effective` inertias are the links' own, to measure what grouping is worth
     """
     tree = _Builder(model, algebra, aligned, grouped).tree()
-    return replace(tree, vanishing_pivots=vanishing_pivots(tree))
+    search = Search(tree)
+    return replace(tree, vanishing_pivots=search.vanishing_pivots(), sound=search.sound)
 
 
 @dataclass
