@@ -32,7 +32,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     """Read the file, simulate here or on a cluster, report, draw."""
     from symdyn.cli import sweep_on_cluster
     from symdyn.ensembles.claims import LEASE
-    from symdyn.ensembles.exports import demand_formats
+    from symdyn.ensembles.exports import demand_formats, missing
     from symdyn.ensembles.plan import plan
     from symdyn.ensembles.run import How, StillAtWork, run
     from symdyn.ensembles.store import MANIFEST, RESULT
@@ -54,7 +54,8 @@ def sweep(arguments: argparse.Namespace) -> int:
     formats = demand_formats(asked.values.get("formats", ()), module.name)
     if arguments.dry_run:
         return sweep_on_cluster.dry_run(arguments, wanted, cluster, folder, formats)
-    if cluster is not None and cluster.kind == "slurm" and not arguments.join and not (folder / RESULT).is_file():
+    done_before = (folder / RESULT).is_file() and not missing(folder, formats)
+    if cluster is not None and cluster.kind == "slurm" and not arguments.join and not done_before:
         return sweep_on_cluster.submit(arguments, wanted, cluster, folder, formats)
     shared = arguments.join or (cluster is not None and cluster.kind == "folder")
     with _executor(arguments, module, wanted.setting.device, cluster) as executor, \

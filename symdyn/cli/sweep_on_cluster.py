@@ -100,10 +100,11 @@ def show_status(folder: Path, cluster: Cluster | None) -> int:
 def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: Path, formats: tuple[str, ...]) -> int:
     """Predict, write down what is requested, and submit workers. Raises Stop where the cluster gives them too little."""
     from symdyn.ensembles.claims import Claims
+    from symdyn.ensembles.exports import missing
     from symdyn.ensembles.lock import OneRun
     from symdyn.ensembles.prediction import contradictions
     from symdyn.ensembles.progress import own_name
-    from symdyn.ensembles.run import prepare
+    from symdyn.ensembles.run import MERGE, prepare
     from symdyn.ensembles.slurm import script
     from symdyn.ensembles.slurm import submit as send
     from symdyn.ensembles.store import check_folder
@@ -124,8 +125,10 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
             claims.forget_ended()
             busy = claims.at_work()
         if busy:
-            raise Stop(f"{counted(busy, 'chunk')} of {folder} {'is' if busy == 1 else 'are'} being computed by workers; --status "
-                       f"shows them, and sbatch {folder / 'slurm.sh'} adds workers")
+            if busy == [MERGE]:
+                raise Stop(f"the results of {folder} are being put together by a worker; wait until it has ended")
+            raise Stop(f"{counted(len(busy), 'chunk')} of {folder} {'is' if len(busy) == 1 else 'are'} being computed by workers"
+                       f"; --status shows them, and sbatch {folder / 'slurm.sh'} adds workers")
         text = arguments.file.read_bytes()
         copy = folder / "sweep.toml"
         write_whole(copy, lambda file: file.write(text))
@@ -133,7 +136,13 @@ def submit(arguments: argparse.Namespace, plan: Plan, cluster: Cluster, folder: 
         command = [sys.executable, "-m", "symdyn", "sweep", str(home / copy.name), "--join", "--output", str(home)]
         command += ["--system", _place(arguments.system)] if arguments.system else []
         command += ["--backend", plan.setting.system.module.backend] + ["--no-picture"] * arguments.no_picture
+        unwritten = missing(folder, formats) if store.complete() else []
+        cluster = replace(cluster, workers=1) if unwritten else cluster
         job = send(home, script(cluster, plan.name, home, command, plan.setting.device != "cpu"))
+    if unwritten:
+        print(f"{plan.name}: Slurm's job {job} with 1 worker writes {' and '.join(unwritten)}; all {store.count} samples "
+              "are done")
+        return 0
     print(f"{plan.name}: Slurm's job {job} with {counted(cluster.workers or 1, 'worker')} computes "
           f"{counted(store.count, 'sample')} in {counted(store.n_chunks, 'chunk')}")
     if measured.timed:

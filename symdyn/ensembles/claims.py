@@ -108,10 +108,11 @@ class Claims:
             if self._ended(path, now):
                 path.unlink(missing_ok=True)
 
-    def at_work(self) -> int:
-        """Number of pieces that other workers have claimed."""
+    def at_work(self) -> list[str]:
+        """Pieces that other workers have claimed."""
         now = self._now()
-        return sum(not self._ended(path, now) for piece, (_, path) in self._latest().items() if piece not in self._own)
+        return sorted(piece for piece, (_, path) in self._latest().items()
+                      if piece not in self._own and not self._ended(path, now))
 
     def _make(self, piece: str, number: int) -> bool:
         path = self.folder / f"{piece}.{number}"

@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -104,6 +104,11 @@ def write_zarr(ensemble: Ensemble, path: Path) -> None:
 
 EXPORTS = {"parquet": Export("ensemble.parquet", "pyarrow", "parquet", write_parquet),
            "zarr": Export("ensemble.zarr", "zarr", "zarr", write_zarr)}
+
+
+def missing(folder: Path, formats: Iterable[str]) -> list[str]:
+    """Formats that are not written yet in the folder of an ensemble."""
+    return [name for name in formats if not (folder / EXPORTS[name].file).exists()]
 
 
 def _package(export: Export) -> None:

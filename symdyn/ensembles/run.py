@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from symdyn.ensembles.chunk import LISTED, Chunk, quiet
 from symdyn.ensembles.claims import ATTEMPTS, BEATS, LEASE, Claims, Heartbeat
 from symdyn.ensembles.dispatch import AHEAD, ExecutorFailed, run_chunks
-from symdyn.ensembles.exports import EXPORTS, demand_formats
+from symdyn.ensembles.exports import EXPORTS, demand_formats, missing
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.plan import Plan, demand_device, plan, whole
 from symdyn.ensembles.progress import Progress, own_name
@@ -218,7 +218,7 @@ class _Run:
 
     def go(self) -> Ensemble:
         begun, store = clock.perf_counter(), self.store
-        if store.complete():
+        if store.complete() and (self.claims is None or not self._missing()):
             self.kept(self._finish)
             store.clear()
             return Ensemble(store.folder, store.count)
@@ -265,7 +265,7 @@ class _Run:
         while not self._complete():
             self._compute(self._claimed(claims))
             if len(self._look()) == self.store.n_chunks and claims.take([MERGE]) is not None:
-                if not self._complete() and not self.store.drop_damaged():
+                if not self._complete() and (self.store.complete() or not self.store.drop_damaged()):
                     self.shown.write("merging")
                     self.kept(self._finish)
                 claims.release(MERGE)
@@ -335,8 +335,7 @@ class _Run:
         return self.store.complete() and not self._missing()
 
     def _missing(self) -> list[str]:
-        """Formats that are not written yet."""
-        return [name for name in self.how.formats if not (self.store.folder / EXPORTS[name].file).exists()]
+        return missing(self.store.folder, self.how.formats)
 
     def _finish(self) -> None:
         """Put the chunks together, and write other formats."""

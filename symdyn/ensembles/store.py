@@ -52,12 +52,12 @@ class Store:
         return {k for k in self.there() if self._is_whole(k)}
 
     def there(self) -> set[int]:
-        """Chunks with files, by their names alone."""
+        """Chunks with files, by their names alone; all of them once they were put together, and may be gone."""
         result: set[int] = set()
         with contextlib.suppress(FileNotFoundError):
             result = {int(stem) for entry in os.scandir(self.chunks)
                       if (stem := entry.name.removesuffix(".npz")).isdigit() and entry.name != stem}
-        return {k for k in result if k < self.n_chunks}
+        return set(range(self.n_chunks)) if self.complete() else {k for k in result if k < self.n_chunks}
 
     def drop_damaged(self) -> bool:
         """Remove chunks that the disk has damaged; whether there were any."""

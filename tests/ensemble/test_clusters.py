@@ -340,6 +340,26 @@ def test_workers_are_not_submitted_twice(tmp_path, capsys, queue):
     assert not list(queue.iterdir())
 
 
+def test_only_the_formats_that_are_missing_are_submitted(tmp_path, capsys, queue):
+    """Also those that a worker was killed at: the results next to them are no sign that all is done."""
+    pytest.importorskip("pyarrow")
+    out, asked = tmp_path / "out", {"table": "[cluster]\nkind = \"slurm\"\nworkers = 3\n"}
+    assert main(["sweep", write(tmp_path, "cluster = \"folder\""), "--output", str(out), "--no-picture"]) == 0
+    path = write(tmp_path, "formats = [\"parquet\"]", **asked)
+    with Claims(out, "other") as other:
+        other.take([run.MERGE])
+        assert main(["sweep", path, "--output", str(out), "--resume"]) == 2
+    assert f"the results of {out} are being put together by a worker; wait until it has ended" in capsys.readouterr().err
+    assert not list(queue.iterdir()) and not (out / "ensemble.parquet").exists()
+    assert main(["sweep", path, "--output", str(out), "--resume", "--no-picture"]) == 0
+    said = capsys.readouterr().out
+    assert said == "double_pendulum: Slurm's job 1 with 1 worker writes parquet; all 400 samples are done\n"
+    waited(queue / "2.done")
+    assert (out / "ensemble.parquet").is_file() and len(list((out / "logs").iterdir())) == 2
+    assert main(["sweep", path, "--output", str(out), "--resume", "--no-picture"]) == 0
+    assert "400 of them computed before" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("table, messages", [
     ("time = 00:00:01\nmemory = \"1 MB\"", ["has 2 faults", "cluster.time: 1 s are asked for, but a worker is predicted to take",
      "for one chunk of 20 motions: it would end before anything is kept; ask for more time, or a smaller chunk",

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.ensembles import run
+from symdyn.ensembles import exports, run
 from symdyn.ensembles.claims import ATTEMPTS, Claims, Heartbeat
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.progress import read_status
@@ -52,14 +52,14 @@ def test_a_piece_is_claimed_once_however_many_try(tmp_path):
 def test_a_claim_ends_with_its_lease_and_not_before(tmp_path):
     with Claims(tmp_path, "a", 60) as a, Claims(tmp_path, "b", 60) as b:
         assert a.take(["1", "2"]) == "1" and b.take(["1", "2"]) == "2"
-        assert b.take(["1", "2"]) is None and b.at_work() == 1
+        assert b.take(["1", "2"]) is None and b.at_work() == ["1"]
         age(a, "1", 50)
         assert b.take(["1"]) is None
         age(a, "1", 70)
         a.touch()
         assert b.take(["1"]) is None
         age(a, "1", 70)
-        assert b.at_work() == 0 and b.take(["1"]) == "1"
+        assert b.at_work() == [] and b.take(["1"]) == "1"
         a.release("1")  # that of a alone
         assert a.take(["1"]) is None
 
@@ -228,6 +228,55 @@ def test_results_are_put_together_by_another_worker_than_the_one_that_was_killed
         age(dead, run.MERGE, 500)
     with pytest.raises(EnsembleStopped, match=r"3 workers ended while they put the results together, which nobody tries again"):
         run.run(asked, tmp_path / "again", run.How(lease=60.0), True)
+
+
+@pytest.fixture
+def exported(monkeypatch):
+    """Workers that have begun to write a format of these tests, which takes a while."""
+    begun = []
+
+    def write(ensemble, path):
+        begun.append(threading.get_ident())
+        time.sleep(0.3)
+        path.write_bytes(ensemble.file.read_bytes())
+
+    monkeypatch.setitem(exports.EXPORTS, "copy", exports.Export("ensemble.copy", "numpy", "", write))
+    monkeypatch.setattr(run, "LOOK", 0.02)
+    return begun
+
+
+def test_workers_that_come_late_leave_the_export_to_the_one_that_has_begun_it(module, tmp_path, exported):
+    asked = run.plan(module, drawn(), (0, 0.1), chunk=10)
+    first = threading.Thread(target=lambda: run.run(asked, tmp_path, run.How(formats=("copy",), lease=60.0), True))
+    first.start()
+    while not exported:
+        time.sleep(0.002)
+    with pytest.raises(run.StillAtWork, match="nothing is left to begin; other workers have begun to put the results together"):
+        run.run(asked, tmp_path, run.How(formats=("copy",), lease=60.0, stays=False), True)
+    found = []
+    late = [threading.Thread(target=lambda: found.append(run.run(asked, tmp_path, run.How(formats=("copy",), lease=60.0), True)))
+            for _ in range(3)]
+    for thread in late:
+        thread.start()
+    for thread in [first, *late]:
+        thread.join()
+    assert len(exported) == 1 and len(found) == 3 and all(done.n_resumed == 40 for done in found)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["ensemble.copy", "ensemble.npz", "failures.jsonl", "manifest.json"]
+
+
+def test_the_export_of_a_worker_that_was_killed_is_taken_over_when_its_claim_ends(module, tmp_path, exported, monkeypatch):
+    asked = run.plan(module, drawn(), (0, 0.1), chunk=10)
+    run.run(asked, tmp_path, run.How(lease=60.0), True)  # chunks and claims are gone
+    monkeypatch.setattr(run, "run_chunks", None)  # none is computed again
+    how = run.How(formats=("copy",), lease=60.0, stays=False)
+    with Claims(tmp_path, "killed", 60) as killed:
+        assert killed.take([run.MERGE])
+        with pytest.raises(run.StillAtWork, match="other workers have begun to put the results together"):
+            run.run(asked, tmp_path, how, True)
+        assert not exported
+        age(killed, run.MERGE, 70)
+        assert run.run(asked, tmp_path, how, True).n_resumed == 40
+    assert len(exported) == 1 and (tmp_path / "ensemble.copy").is_file()
 
 
 def test_the_bar_of_each_counts_what_all_have_done(module, tmp_path, capsys):
