@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from typing import Any
@@ -14,6 +15,8 @@ from symdyn.errors import SymdynError
 ATTEMPTS = 3
 # Chunks that wait for every worker, so that none is ever idle.
 AHEAD = 3
+# Seconds after which the workers are counted again: those of a cluster come and go.
+RECOUNT = 2.0
 
 
 class ExecutorFailed(SymdynError):
@@ -25,24 +28,26 @@ def run_chunks(todo: Iterator[Chunk], make: Callable[[], Executor], again: bool,
     """Outcomes of the chunks, in the order in which they are done.
 
     make          gives the executor; after it has died it is asked for another one if `again`
-    outstanding   chunks that are handed over at a time; default: `ahead` for every worker
+    outstanding   chunks that are handed over at a time; default: `ahead` for every worker that there is by then
     Raises ExecutorFailed where there is no other executor, and where a chunk has failed ATTEMPTS times.
     """
     executor, born = make(), 0
-    limit = outstanding or ahead * _workers(executor)
+    limit, counted = outstanding or ahead * _workers(executor), clock.monotonic()
     back: list[Chunk] = []
     attempts: dict[int, int] = {}
     pending: dict[Future[Done], tuple[Chunk, int]] = {}
     try:
         while True:
             chunk, of = None, born
+            if outstanding is None and clock.monotonic() - counted >= RECOUNT:
+                limit, counted = ahead * _workers(executor), clock.monotonic()
             try:
                 while len(pending) < limit and (chunk := back.pop() if back else next(todo, None)) is not None:
                     pending[executor.submit(run_chunk, chunk)] = chunk, born
                 chunk = None
                 if not pending:
                     return
-                for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                for future in wait(pending, RECOUNT, FIRST_COMPLETED).done:
                     chunk, of = pending.pop(future)
                     result = future.result()
                     chunk = None

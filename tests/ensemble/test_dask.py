@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import signal
@@ -16,7 +17,8 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli import main
-from symdyn.ensembles import run
+from symdyn.ensembles import dispatch, run
+from symdyn.ensembles.plan import plan
 from symdyn.ensembles.progress import read_status
 from symdyn.runtime.building.recall import recall
 
@@ -100,6 +102,48 @@ def test_all_workers_of_dask_are_shown_by_the_one_who_asked(cluster, tmp_path, m
     assert (last.n_done, last.count, last.complete) == (COUNT, COUNT, False)
     assert len(last.workers) == 2 and sum(w.samples for w in last.workers) == COUNT - 10  # the last one is not counted yet
     assert not any(w.lost for w in last.workers) and all(w.samples > 0 for w in last.workers)
+
+
+def chunks(enough):
+    """Chunks of one motion, until there are enough, or a minute is over."""
+    asked = plan(recall("double_pendulum", {}), samples(), (0, 0.1), chunk=1).tried()
+    end = time.monotonic() + 60
+    for k in itertools.count():
+        if enough() or time.monotonic() > end:
+            return
+        yield asked.chunk(k % COUNT, 1)
+
+
+def test_workers_that_join_get_chunks_and_those_that_leave_get_none(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(dispatch, "RECOUNT", 0.02)
+    handed, outstanding, done = 0, [], []
+
+    def counted(todo):
+        nonlocal handed
+        for chunk in todo:
+            handed += 1
+            outstanding.append(handed - len(done))
+            yield chunk
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0",
+                                  silence_logs=50) as local, local.get_client() as client:
+        def grown():
+            return outstanding and outstanding[-1] > dispatch.AHEAD
+
+        for found in dispatch.run_chunks(counted(chunks(lambda: grown() and len({d.worker for d in done}) > 1)),
+                                         client.get_executor, False):
+            done.append(found)
+            if len(done) == 1:
+                assert max(outstanding) == dispatch.AHEAD
+                local.scale(3)
+        assert dispatch.AHEAD < max(outstanding) <= 3 * dispatch.AHEAD and len(done) == handed
+        local.scale(1)
+        before = len(outstanding)
+        for found in dispatch.run_chunks(counted(chunks(lambda: len(client.nthreads()) == 1 and len(outstanding) > before + 30)),
+                                         client.get_executor, False):
+            done.append(found)
+        assert max(outstanding[-5:]) <= dispatch.AHEAD
 
 
 SCRIPT = """
