@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,6 +147,89 @@ def test_workers_that_join_get_chunks_and_those_that_leave_get_none(monkeypatch)
                                          client.get_executor, False):
             done.append(found)
         assert max(outstanding[-5:]) <= dispatch.AHEAD
+
+
+CLUSTER = """
+import sys, time
+from distributed import LocalCluster
+
+with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=":0",
+                  silence_logs=50) as cluster:
+    print(cluster.scheduler_address, flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX")
+def test_a_scheduler_that_is_gone_is_reported_in_one_line(tmp_path):
+    pytest.importorskip("distributed")
+    path, out = tmp_path / "a.toml", tmp_path / "out"
+    path.write_text('system = "double_pendulum"\nt = [0, 1]\nsampling = "random"\ncount = 3000\nchunk = 2\n[initial]\n'
+                    "q1 = {from = -1, to = 1}\n")
+    asked = [sys.executable, "-m", "symdyn", "sweep", str(path), "--no-picture", "--output", str(out)]
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as there:
+        address = there.stdout.readline().strip()
+        with subprocess.Popen([*asked, "--dask", address, "--dask-timeout", "10"], stderr=subprocess.PIPE, text=True) as sweep:
+            while sweep.poll() is None and len(list((out / "chunks").glob("0*.npz"))) < 20:
+                time.sleep(0.002)
+            there.kill()
+            said = sweep.communicate()[1]
+    assert sweep.returncode == 1
+    found = re.fullmatch(rf"symdyn: double_pendulum: the ensemble stopped: Dask's scheduler at {address} is gone; "
+                         rf"start one again; (\d+) of 3000 samples are kept in {out}; "
+                         r"pass resume=True \(--resume\) to go on from there\n", said)
+    assert found, said
+    kept = int(found[1])
+    assert 40 <= kept < 3000 and len(list((out / "chunks").glob("0*.npz"))) == kept // 2
+    again = subprocess.run([*asked, "--resume", "--jobs", "1"], capture_output=True, text=True, check=True).stdout
+    assert f"3000 samples of q1, {kept} of them computed before" in again
+
+
+class Client:
+    """Stand-in for Dask's: `lost` of its futures have no end when its scheduler is lost, after which it is as `then` says."""
+
+    def __init__(self, lost, then="running"):
+        self.lost, self.then, self.status, self.scheduler_comm, self.asked = lost, then, "running", object(), []
+        self.scheduler, self.loop = SimpleNamespace(address="tcp://far:1"), self
+
+    def nthreads(self):
+        return {"a": 1}
+
+    def submit(self, function, chunk):
+        self.asked.append(chunk.index)
+        return function, chunk
+
+    def add_callback(self, follow, asked, result):
+        if len(self.asked) > self.lost:
+            result.set_result(asked[0](asked[1]))
+        elif len(self.asked) == self.lost:
+            self.status = "connecting"
+            threading.Timer(0.05, self.connect).start()
+
+    def connect(self):
+        self.status, self.scheduler_comm = self.then, object()
+
+    def get_executor(self):
+        return SimpleNamespace(_client=self, _kwargs={})
+
+
+def test_a_scheduler_that_comes_back_gets_all_chunks_again():
+    client, todo = Client(3), [next(chunks(lambda: False)) for _ in range(5)]
+    todo = [replace(chunk, index=k) for k, chunk in enumerate(todo)]
+    found = sorted(done.index for done in dispatch.run_chunks(iter(todo), client.get_executor, False))
+    assert found == [0, 1, 2, 3, 4] and sorted(client.asked) == [0, 0, 1, 1, 2, 2, 3, 4]
+
+
+def test_another_scheduler_is_asked_for_where_there_is_a_function_that_gives_one():
+    todo = [replace(next(chunks(lambda: False)), index=k) for k in range(5)]
+    clients = [Client(3, "closed"), Client(0)]
+    made = iter(clients)
+    assert len(list(dispatch.run_chunks(iter(todo), lambda: next(made).get_executor(), True))) == 5
+    assert sorted(clients[1].asked) == [0, 1, 2, 3, 4]
+    dead = (Client(1, "closed") for _ in range(9))
+    with pytest.raises(dispatch.ExecutorFailed, match=r"samples 0 to 0 cannot be computed, tried 3 times: ConnectionError: "
+                                                      "no scheduler at tcp://far:1"):
+        list(dispatch.run_chunks(iter(todo[:1]), lambda: next(dead).get_executor(), True))
 
 
 SCRIPT = """
