@@ -1,4 +1,7 @@
-"""Numbers that states, events and contacts are decided by, the same in Python and in generated C."""
+"""Numbers that states, events and contacts are decided by, the same in Python and in generated C.
+
+Residuals of positions count by the mechanism's length, of speeds by the largest speed as a velocity.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,21 @@ from __future__ import annotations
 # part of the entries of the diagonal: rows that depend on each other. RANK in
 # symdyn/tape/intrinsics.py is for J itself.
 DEPENDENT = 1e-10
+
+# Projections. What rounding leaves of positions and speeds, and from which on a projection has failed.
+LEFT, TOO_MUCH_POSITION, TOO_MUCH_SPEED = 1e-13, 1e-9, 1e-8
+# Coordinates are known to eps |q| only, |q| the largest of them in m (angles times the length): of positions rounding leaves this
+# part of |q| by the length where that is more, and a failure is more than so many times that. Within 100 lengths it is not felt.
+RESOLVED, FAILED = 9e-16, 4.0
+# Residuals of positions that are not corrected, and speeds that residuals are measured by at the least, 1/s, by the length.
+EXACT, SLOWEST = 4e-16, 1e-5
+# Corrections are repeated so often at the most, as long as each leaves less than this part of what was left.
+ROUNDS, SHRINKS = 12, 0.7
+# A step whose end is projected: what it may change, as a part of the way of the step, and of the coordinates and the length. More
+# is no correction but a jump, to another branch maybe.
+PART_OF_WAY, PART_OF_SIZE = 0.5, 1e-6
+# Changes that count, as a part of the tolerance, and in roundings of the largest entry.
+NOTICED, ROUNDINGS = 1e-3, 16.0
 
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14

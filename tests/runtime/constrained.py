@@ -38,11 +38,15 @@ def top() -> sd.System:
     return system
 
 
+def equations(name: str) -> Any:
+    """The equations of one of these, or of a system of the catalogue, augmented if it has constraints."""
+    system = {"driven": driven, "top": top}.get(name, lambda: systems.get(name))()
+    return system.augmented() if system.loops or system.constraints else system.embedding()
+
+
 @functools.cache
 def module(name: str, backend: str = "c") -> Any:
-    """The module of one of these, or of a system of the catalogue, augmented if it has constraints; skips without a compiler."""
+    """The module of one of these; skips without a compiler."""
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")
-    system = {"driven": driven, "top": top}.get(name, lambda: systems.get(name))()
-    constrained = system.loops or system.constraints
-    return (system.augmented() if constrained else system.embedding()).compile(backend=backend)
+    return equations(name).compile(backend=backend)

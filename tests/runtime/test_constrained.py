@@ -14,6 +14,8 @@ import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating import stabilization
+from symdyn.runtime.integrating.stabilization import ProjectionFailed, Projector
 from symdyn.runtime.integrating.stops import lost_rank
 from tests.helpers import swept
 from tests.runtime.constrained import module
@@ -224,6 +226,32 @@ def test_far_from_the_origin(method: str) -> None:
     np.testing.assert_allclose(distance[1], abs(along), rtol=1e-6)
 
 
+@pytest.mark.parametrize(("method", "end", "step"), [("RK23", 1.0, 0.5), ("RK45", 1.0, 0.5), ("DOP853", 1.0, 0.5),
+                                                     ("Radau", 2.0, 1.0)])
+def test_a_step_that_a_projection_would_take_to_another_place_is_tried_again_shorter(method: str, end: float, step: float,
+                                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tolerances that every step meets, and steps that end far off: projected from there, the four-bar linkage of the RK23 once
+    jumped by 4.5 rad at a step, without a message."""
+    taken, rejected, project = [], 0, Projector.step
+
+    def noted(self: Projector, t: float, x: np.ndarray, start: np.ndarray, *tolerances: Any) -> Any:
+        nonlocal rejected
+        try:
+            result = project(self, t, x, start, *tolerances)
+        except ProjectionFailed:
+            rejected += 1
+            raise
+        taken.append((np.linalg.norm(x[:3] - start[:3]), np.linalg.norm(result[0][:3] - x[:3])))
+        return result
+
+    monkeypatch.setattr(Projector, "step", noted)
+    run = module("four_bar").simulate(np.array([0.0, end]), rtol=0.1, atol=1e3, first_step=step, max_step=step, method=method)
+    way, correction = np.array(taken).T
+    assert run.success and run.n_steps == len(taken) and run.n_rejected == rejected > 0
+    assert (correction <= 0.5 * way + 1e-5 * np.abs(run.q).max()).all() and run.corrections.position == correction.max()
+    assert worst(run)[0] < 1e-12
+
+
 # -- what cannot go on
 
 
@@ -241,6 +269,17 @@ def test_no_way_back(method: str) -> None:
 def test_no_way_back_on_numpy(method: str) -> None:
     with pytest.warns(SimulationWarning, match="nearly lose rank there .1 instead of 2.: circle, lift nearly depend"):
         module("driven", "numpy").simulate((0, 2), method=method)
+
+
+@pytest.mark.parametrize("method", swept(["RK23", "DOP853", "Radau"], "RK23", "Radau"))
+def test_corrections_that_are_too_far_however_short_the_step(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no end of a step counts as near, no step is short enough."""
+    monkeypatch.setattr(stabilization, "PART_OF_WAY", -1.0)
+    monkeypatch.setattr(stabilization, "PART_OF_SIZE", 0.0)
+    with pytest.warns(SimulationWarning, match="stopped at t = .*: no way back onto the constraints: the correction would go "
+                                               "further than half the step"):
+        run = module("pendulum_absolute", "numpy").simulate((0, 1), method=method)
+    assert not run.success and run.n_steps == 0 and run.n_rejected > 20
 
 
 def test_what_is_lost_where_a_gradient_vanishes() -> None:

@@ -24,7 +24,7 @@ from symdyn.runtime.integrating.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.run_record import NOTED, STATUS, Noted, Report, RunReport
 from symdyn.runtime.integrating.short_steps import ShortSteps
-from symdyn.runtime.integrating.stabilization import Corrections, not_converged, not_smooth, reset_rejected
+from symdyn.runtime.integrating.stabilization import TOO_FAR, Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
 from symdyn.thresholds import CHATTER
@@ -390,4 +390,4 @@ def _off(module: Module, run: Run, report: RunReport) -> str:
         return run.library.reason(reason)
     if 0 <= worst < len(rows):
         return not_converged(rows[worst], report.residual, bool(report.of_speeds))
-    return "the correction would go further than half the step"
+    return TOO_FAR

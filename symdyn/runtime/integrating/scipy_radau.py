@@ -14,6 +14,8 @@ import numpy as np
 from scipy.integrate import DenseOutput, Radau
 from scipy.integrate._ivp.radau import MU_REAL, C
 
+from symdyn.runtime.integrating.taken_back import take_back
+
 # Where c (c - c_1) (c - c_2) (c - 1), what stiff motion of degree 4 has beyond the polynomial, is largest in the step.
 EXTRA = 0.8611601583007704
 # Size of the gap that is accepted, in tolerances: the polynomial with it is an order better.
@@ -55,10 +57,7 @@ class RadauWithin(Radau):
             if not size > 1.0 or (tried is not None and size > tried[1] * (h / tried[0])**ROUNDING_ORDER):
                 return success, message
             tried = (h, size)
-            counts = {name: getattr(self, name) for name in ("nfev", "njev", "nlu")}
-            # The factors that SciPy kept are those of another length.
-            self.__dict__.update(before | counts | {"LU_real": None, "LU_complex": None})
-            self.h_abs = abs(h) * max(SHORTEST, SAFETY * size**(-1 / ORDER))
+            take_back(self, before, abs(h) * max(SHORTEST, SAFETY * size**(-1 / ORDER)))
 
     def _gap(self, h: float) -> np.ndarray:
         """Defect at the extra place over (gamma/h - J)."""

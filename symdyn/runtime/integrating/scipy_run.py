@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,12 +21,16 @@ from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.short_steps import TRIED_OF_SCIPY, ShortSteps
 from symdyn.runtime.integrating.stabilization import Corrections, DriftCheck, ProjectionFailed, Projector
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
+from symdyn.runtime.integrating.taken_back import take_back
 from symdyn.runtime.raised import InputRaised
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
+# Steps whose ends are off the constraints and that are not tried again shorter, as a part of the run. In C they come down to
+# rounding, which before a place that no motion goes past takes tens of thousands of them: too many in Python.
+SHORTEST = 1e-10
 _SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -165,6 +170,7 @@ class Run:
         self.ts, self.xs = [self.here], [self.state]
         self.pending = list(request.times[1:]) if request.times is not None else []
         self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0, 0), "", False
+        self.n_given_up = 0  # steps that were taken and whose ends could not be put onto the constraints
         self.cause: BaseException | None = None  # as in Outcome
         self.raised: InputRaised | None = None
         self.stops = list(request.inputs.stops(request.span))  # kinks of the inputs, at which steps end
@@ -232,17 +238,22 @@ class Run:
     def step(self) -> None:
         """One step, its events and outputs; a message if it is the last one."""
         solver, begun, start = self.solver, float(self.solver.t), self.state
-        before = getattr(solver, "h_abs", 0.0)
-        note = solver.step()
-        self.proposed = max(before, getattr(solver, "h_abs", 0.0))
-        if solver.status == "failed" or not np.isfinite(solver.y).all():
-            self.message = self._why_failed(note)
-            return
-        self.field.trouble.clear()
-        # The polynomial of the step ends where the step did, before the projection.
-        passed = self.pending and (self.pending[0] - solver.t) * solver.direction < 0
-        self.dense = solver.dense_output() if passed or self.locator is not None else None
-        self._project()
+        proposed, tried = getattr(solver, "h_abs", 0.0), self.n_given_up
+        while True:
+            before = vars(solver).copy() if self.projector is not None else {}
+            note = solver.step()
+            if solver.status == "failed" or not np.isfinite(solver.y).all():
+                self.message = self._why_failed(note)
+                return
+            self.field.trouble.clear()
+            # The polynomial of the step ends where the step did, before the projection.
+            passed = self.pending and (self.pending[0] - solver.t) * solver.direction < 0
+            self.dense = solver.dense_output() if passed or self.locator is not None else None
+            if self._project(start, begun, before):
+                break
+        if self.n_given_up > tried:  # no longer at once, as in C
+            proposed = solver.h_abs = min(solver.h_abs, abs(float(solver.t) - begun))
+        self.proposed = max(proposed, getattr(solver, "h_abs", 0.0))
         self.accepted += 1
         self.here, self.state = float(solver.t), solver.y.copy()
         cut = self._look(begun, start) if self.locator is not None else None
@@ -290,14 +301,28 @@ class Run:
         result = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
         return next(filter(None, result), "")
 
-    def _project(self) -> None:
-        solver = self.solver
-        if self.projector is not None:
-            tolerated = self.request.atol + self.request.rtol * np.abs(solver.y)
-            projected, moved = self.projector.step(float(solver.t), solver.y, tolerated)
-            if moved:
-                solver.f = solver.fun(solver.t, projected)
-            solver.y = projected
+    def _project(self, start: np.ndarray, begun: float, before: Mapping[str, Any]) -> bool:
+        """Put the end of a step from a state onto the constraints; whether it is there. Where it cannot be, or only by more than
+        half the step, the solver gets its attributes before the step back, to try half of it, as in C.
+
+        Raises ProjectionFailed where there is no shorter step.
+        """
+        solver, request = self.solver, self.request
+        if self.projector is None:
+            return True
+        try:
+            projected, moved = self.projector.step(float(solver.t), solver.y, start, request.atol, request.rtol)
+        except ProjectionFailed:
+            length = abs(float(solver.t) - begun)
+            if length <= SHORTEST * abs(request.span[1] - request.span[0]):
+                raise
+            take_back(solver, before, length / 2)
+            self.n_given_up += 1
+            return False
+        if moved:
+            solver.f = solver.fun(solver.t, projected)
+        solver.y = projected
+        return True
 
     def between(self, t: float) -> np.ndarray:
         """The state within the latest step."""
@@ -368,6 +393,7 @@ class Run:
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
         rejected, evaluations, jacobians, factorizations = self._used()
+        rejected += self.n_given_up
         doubts = []
         if self.locator is not None:
             doubts = [too_quick(self.module, self.locator.too_quick),

@@ -12,6 +12,21 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.real_numbers import number_of
 from symdyn.runtime.constraints import as_velocities, length, names
 from symdyn.shown import shown
+from symdyn.thresholds import (
+    EXACT,
+    FAILED,
+    LEFT,
+    NOTICED,
+    PART_OF_SIZE,
+    PART_OF_WAY,
+    RESOLVED,
+    ROUNDINGS,
+    ROUNDS,
+    SHRINKS,
+    SLOWEST,
+    TOO_MUCH_POSITION,
+    TOO_MUCH_SPEED,
+)
 from symdyn.turning import is_angle
 
 if TYPE_CHECKING:
@@ -20,13 +35,8 @@ if TYPE_CHECKING:
 WAYS = ("projection", "baumgarte", "none")
 # Positions that are further off than this part of the mechanism's length are no motion of it any more.
 LOST = 1e-2
-_ROUNDS = 12
-# Residuals of positions relative to the length, of speeds relative to the largest: what rounding leaves, what is a failure.
-# Coordinates are known to eps |q| only, |q| the largest of them in m (angles times the length): of positions rounding leaves
-# 4 eps |q| / length where that is more, and a failure is more than four times that. Within 100 lengths or rad it is not felt.
-_ROUNDING = np.array([1e-13, 1e-13])
-_TOO_MUCH = np.array([1e-9, 1e-8])
-_RESOLVED = 9e-16
+# Why the end of a step is not put onto the constraints though it could be.
+TOO_FAR = "the correction would go further than half the step"
 
 
 @dataclass(frozen=True)
@@ -148,14 +158,15 @@ class Projector:
         factors = np.concatenate([self.lengths, self.velocities])
         sizes = np.abs(x[:len(factors)] * factors)
         asked = float((np.abs(wanted - x)[indices] * factors[indices]).max())
-        size = max(1e-5 * self.length, sizes[self.n_q:].max(), asked) if of_speeds else self.length
-        allowed = _TOO_MUCH[1] if of_speeds else max(_TOO_MUCH[0], 4 * _RESOLVED * sizes[:self.n_q].max() / self.length)
+        size = max(SLOWEST * self.length, sizes[self.n_q:].max(), asked) if of_speeds else self.length
+        allowed = TOO_MUCH_SPEED if of_speeds else max(TOO_MUCH_POSITION,
+                                                       FAILED * RESOLVED * sizes[:self.n_q].max() / self.length)
         worst = np.inf
-        for _ in range(_ROUNDS + 1):
+        for _ in range(ROUNDS + 1):
             gaps = (wanted - x)[indices]
             before, parts = worst, np.abs(gaps) * factors[indices] / size
             worst, entry, left = float(parts.max()), indices[int(parts.argmax())], float(np.abs(gaps)[int(parts.argmax())])
-            if worst <= 1e-15 or worst > 0.7 * before:
+            if worst <= 1e-15 or worst > SHRINKS * before:
                 break
             try:
                 directions = self.directions(t, x)[rows]
@@ -181,17 +192,21 @@ class Projector:
         result[free] = _multipliers(directions[free][:, np.array(indices)[free]].T, gaps[free])
         return result
 
-    def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
-        """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
-        result = self(t, x)
+    def step(self, t: float, x: np.ndarray, start: np.ndarray, atol: np.ndarray, rtol: float) -> tuple[np.ndarray, bool]:
+        """The same for the end x of a step from the state `start`, and whether it is a change to speak of, given the tolerances;
+        raises ProjectionFailed, too, where the way to the constraints is more than half the step's."""
+        result, middle = self(t, x), self.n_q + self.n_u
         change = np.abs(result - x)
-        middle = self.n_q + self.n_u
+        changes = [np.linalg.norm(change[:self.n_q]), np.linalg.norm(change[self.n_q:middle])]
+        most = PART_OF_WAY * np.linalg.norm(x[:self.n_q] - start[:self.n_q]) + PART_OF_SIZE * np.linalg.norm(result[:self.n_q])
+        if changes[0] > most + PART_OF_SIZE * self.length * (self.n_c > 0):
+            raise ProjectionFailed(f"no way back onto the constraints: {TOO_FAR}")
         rounding = np.zeros(len(x))
         for part in (slice(0, self.n_q), slice(self.n_q, middle)):
-            rounding[part] = 16 * np.finfo(float).eps * np.abs(x[part]).max(initial=0.0)
-        moved = bool((change > 1e-3 * tolerated + rounding).any())
+            rounding[part] = ROUNDINGS * np.finfo(float).eps * np.abs(result[part]).max(initial=0.0)
+        moved = bool((change > NOTICED * (atol + rtol * np.abs(result)) + rounding).any())
         self.n_steps += moved
-        self.largest = np.maximum(self.largest, [np.linalg.norm(change[:self.n_q]), np.linalg.norm(change[self.n_q:middle])])
+        self.largest = np.maximum(self.largest, changes)
         return result, moved
 
     @property
@@ -205,23 +220,23 @@ class Projector:
     def _correct(self, t: float, x: np.ndarray) -> None:
         """Corrections until residuals are at rounding level, or shrink no further."""
         q, u = x[:self.n_q], x[self.n_q:self.n_q + self.n_u]
-        left, rounding = np.full(2, np.inf), _ROUNDING
-        for _ in range(_ROUNDS):
+        left, rounding = np.full(2, np.inf), np.full(2, LEFT)
+        for _ in range(ROUNDS):
             before = left
             if left[0] > rounding[0]:
                 row = self._evaluate("position_correction", t, x)
-                if np.abs(row[:self.n_c]).max() > 4e-16 * self.length:
+                if np.abs(row[:self.n_c]).max() > EXACT * self.length:
                     q += row[self.n_c:]
                     self._normalise(x)
             u += self._evaluate("velocity_correction", t, x)[self.n_c:]
             residuals = np.abs(self._evaluate("violation", t, x)).reshape(2, self.n_c)
-            speed = max(1e-5 * self.length, np.abs(u * self.velocities).max(initial=0.0))
+            speed = max(SLOWEST * self.length, np.abs(u * self.velocities).max(initial=0.0))
             left = residuals.max(axis=1) / [self.length, speed]
             far = np.abs(q * self.lengths).max(initial=0.0) / self.length
-            rounding = np.maximum(_ROUNDING, [_RESOLVED * far, 0.0])
-            if not ((left > rounding) & (left < 0.7 * before)).any():
+            rounding = np.array([max(LEFT, RESOLVED * far), LEFT])
+            if not ((left > rounding) & (left < SHRINKS * before)).any():
                 break
-        too_much = np.maximum(_TOO_MUCH, [4 * rounding[0], 0.0])
+        too_much = np.array([max(TOO_MUCH_POSITION, FAILED * rounding[0]), TOO_MUCH_SPEED])
         if (left > too_much).any():
             of_speeds = bool(left[0] <= too_much[0])
             worst = int(residuals[int(of_speeds)].argmax())
