@@ -25,7 +25,17 @@ PART_OF_WAY, PART_OF_SIZE = 0.5, 1e-6
 # Changes that count, as a part of the tolerance, and in roundings of the largest entry.
 NOTICED, ROUNDINGS = 1e-3, 16.0
 
+# Resets on constraints. What would take other entries so many times as far is held by the constraints; gaps that are closed.
+HOLDS, CLOSED = 1e6, 1e-15
+# Coordinates that a reset moves by more than this part of their size come onto the constraints on a way of their own. Parts of a
+# derivative that count as none: of coordinates that may be free; of what is held, by that of all coordinates or speeds, and by
+# all that changes anywhere.
+OFF, FREE, GAP, GAP_OF_ALL = 1e-9, 1e-8, 1e-6, 1e-10
+
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14
 # So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
 CHATTER, MOST_RESETS = 1e-10, 5
+
+# Flights of rigid contacts shorter than so many roundings of the time are not followed.
+FLIGHT = 1e4

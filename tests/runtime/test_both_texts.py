@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from symdyn import systems
 from symdyn.backend.right_side import RightSide
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.library import CLibrary
@@ -16,8 +19,16 @@ from symdyn.runtime.integrating.compiled import Run
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.runtime.integrating.run_record import STATUS
 from symdyn.runtime.integrating.simulate import start_of
-from symdyn.runtime.integrating.stabilization import TOO_FAR, ProjectionFailed, Projector, Stabilization
+from symdyn.runtime.integrating.stabilization import (
+    TOO_FAR,
+    ProjectionFailed,
+    Projector,
+    Stabilization,
+    reset_rejected,
+    solve_open,
+)
 from symdyn.runtime.module import Module
+from tests.c_rows import needs_c, rows_in_c
 from tests.runtime.constrained import equations
 
 RTOL = 1e-8
@@ -97,3 +108,116 @@ def test_ends_of_steps_are_put_onto_constraints_alike(name: str) -> None:
         counts["moved" if changed else "kept"] += 1
     assert counts["moved"] > ENDS // 10 and counts["kept"] > ENDS // 10 and counts["far"] > ENDS // 20
     assert counts["failed"] > 0 or not projector.n_c
+
+
+# -- resets
+
+KEEP_RESETS = """
+SYMDYN_EXPORT void symdyn_keep_all(symdyn_run *run, long n, const double *old, double *x, const int *asked, int *status,
+    int *entry, double *gap) {
+    for (long k = 0; k < n; k++) {
+        status[k] = symdyn_keep_resets(run, 0.0, old + k * SYMDYN_NX, x + k * SYMDYN_NX, asked + k * SYMDYN_HELD);
+        entry[k] = (int)run->bad_index;
+        gap[k] = run->events.reset_gap;
+    }
+}
+"""
+RESETS = 500
+OPEN_ROWS = """
+#include "pivots.h"
+static int solve(const double *in, double *out) {
+    double G[M * M], gap[M], sizes[M];
+    int open[M], order[M];
+    for (int i = 0; i < M * M; i++) G[i] = in[i];
+    for (int i = 0; i < M; i++) {
+        sizes[i] = G[(M + 1) * i];
+        gap[i] = in[M * M + i];
+        open[i] = in[M * M + M + i] > 0.0 && sizes[i] > 0.0;
+        out[i] = 0.0;
+        out[M + i] = -1.0;
+    }
+    const int n = symdyn_solve_open(M, G, sizes, gap, open, order);
+    for (int k = 0; k < n; k++) {
+        out[order[k]] = gap[order[k]];
+        out[M + k] = order[k];
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.native
+@needs_c
+@pytest.mark.parametrize("m", range(1, 6))
+def test_rows_that_are_open_are_solved_alike(m: int, tmp_path: Path) -> None:
+    """Rows of full rank, one that depends on others, almost so, none that moves, of sizes far apart; gaps that can be closed and
+    others; rows that are not asked for: the same bits, and the same rows are taken in the same order."""
+    stream, rows = np.random.default_rng(m), []
+    for k in range(2000):
+        L = stream.normal(size=(m, m + 1))
+        if k % 5 in (1, 2):
+            L[-1] = stream.choice([-1.0, 0.5, 2.0], m - 1) @ L[:-1] + (k % 5 == 2) * 10.0 ** stream.uniform(-9, -2) * L[-1]
+        elif k % 5 == 3:
+            L[stream.integers(m)] = 0.0
+        elif k % 5 == 4:
+            L *= 10.0 ** stream.uniform(-6, 6, (m, 1))
+        G = L @ L.T
+        gap = G @ stream.normal(size=m) if stream.uniform() < 0.6 else stream.normal(size=m)
+        rows.append(np.concatenate([G.ravel(), gap, stream.uniform(size=m) < 0.8]))
+    found, _ = rows_in_c(tmp_path, f"enum {{ M = {m} }};\n{OPEN_ROWS}", "solve(", m * m + 2 * m, 2 * m)(
+        np.array(rows))
+    left_out = 0
+    for row, result in zip(rows, found, strict=True):
+        G, gap = row[:m * m].reshape(m, m), row[m * m:m * m + m]
+        places = np.flatnonzero((row[m * m + m:] > 0) & (np.diag(G) > 0))
+        f, taken = solve_open(G[np.ix_(places, places)], gap[places])
+        whole = np.zeros(m)
+        whole[places] = f
+        assert np.array_equal(result[:m], whole)
+        assert result[m:m + len(taken)].tolist() == places[taken].tolist() and (result[m + len(taken):] == -1).all()
+        left_out += len(taken) < len(places)
+    assert left_out > 100 or m == 1
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("name", ["four_bar", "bricard", "spatial_slider_crank"])
+def test_states_after_resets_are_put_onto_constraints_alike(name: str, seed: int) -> None:
+    """Resets of any entries to what constraints allow, almost allow, and do not: the same are rejected, for the same entry, and
+    the others get the same state. Constraints of the bricard depend on each other everywhere."""
+    stream, system = np.random.default_rng(seed), systems.get(name)
+    symbols = [q for joint in system.joints for q in joint.coordinates]
+    system.add_event("all", symbols[0] - 1, reset={e: e for q in symbols for e in (q, q.dot)})
+    of, run, projector = opened(system.augmented(), KEEP_RESETS)
+    n, middle = of.metadata.sizes.x, projector.n_q + projector.n_u
+    held = sorted({k for event in of.metadata.events for k in event.reset})
+    old, x, asked = np.zeros((RESETS, n)), np.zeros((RESETS, n)), np.zeros((RESETS, len(held)), dtype=np.intc)
+    for k in range(RESETS):
+        old[k] = run.request.x0
+        old[k, :middle] += 0.2 * stream.normal(size=middle)
+        with suppress(ProjectionFailed):
+            old[k] = projector(0.0, old[k])
+        target = old[k].copy()
+        target[:middle] += 10.0 ** stream.uniform(-9, -0.5) * stream.normal(size=middle)
+        if k % 3 < 2:
+            with suppress(ProjectionFailed):
+                target = projector(0.0, target)
+        if k % 3 == 1:
+            target[:middle] += 10.0 ** stream.uniform(-14, -7) * stream.normal(size=middle)
+        asked[k] = stream.uniform(size=len(held)) < stream.choice([0.15, 0.4, 1.0])
+        x[k] = np.where(np.isin(np.arange(n), np.array(held)[asked[k] > 0]), target, old[k])
+    given, status, entry, gap = x.copy(), np.zeros(RESETS, dtype=np.intc), np.zeros(RESETS, dtype=np.intc), np.zeros(RESETS)
+    keep = run.library.handle.symdyn_keep_all
+    keep(run.address, ctypes.c_long(RESETS), *pointers(old, x, asked, status, entry, gap))
+    counts = dict.fromkeys(set(status.tolist()), 0)
+    for k in range(RESETS):
+        counts[int(status[k])] += 1
+        try:
+            result = projector.keeping(0.0, given[k], [held[j] for j in np.flatnonzero(asked[k])])
+        except ProjectionFailed as error:
+            assert status[k] in (STATUS.PROJECTION_FAILED, STATUS.RESET_REJECTED)
+            if status[k] == STATUS.RESET_REJECTED:
+                assert str(error) == reset_rejected(of.metadata.x[entry[k]], float(gap[k]))
+            continue
+        assert status[k] == 0
+        assert np.abs(result - x[k]).max() <= 1e-10 * (1 + np.abs(x[k]).max())
+    assert counts[0] > RESETS // 4 and counts[STATUS.RESET_REJECTED] > RESETS // 10

@@ -278,15 +278,6 @@ OFF, SIZE = 0.1, 0.5
 ECCENTRIC = OFF * sp.cos(X) + sp.sqrt(SIZE**2 - OFF**2 * sp.sin(X)**2)
 
 
-@pytest.mark.parametrize(("shape", "reach"), [(Shapes.Point(), 0.0), (SPHERE, 0.2)])
-def test_the_gap_above_a_cam_is_the_distance_to_first_order(shape: Any, reach: float) -> None:
-    module = on_a_cam((shape, Shapes.Cam(ECCENTRIC, X))).compile(backend="numpy")
-    for angle in np.linspace(0, 6, 7):
-        away, phi = SIZE + reach + 1e-5, 0.3
-        x, y = OFF * np.cos(phi) + away * np.cos(angle), OFF * np.sin(phi) + away * np.sin(angle)
-        assert module.evaluate("contact_gaps", 0.0, [x, y, 0, phi, 0, 0, 0, 0])[0] == pytest.approx(1e-5, rel=1e-3)
-
-
 def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
     """A roller and a point on a cam that turns, given by an expression and as a periodic spline, against a circle."""
     turn = np.linspace(0, 2 * np.pi, 201)

@@ -15,15 +15,10 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.runtime.integrating.stabilization import ProjectionFailed, Projector, not_smooth
 from symdyn.runtime.integrating.way_back import Way
+from symdyn.thresholds import FREE, GAP, GAP_OF_ALL, OFF
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
-
-# Coordinates that move by more than this part of their size come onto the constraints on a way of their own.
-OFF = 1e-9
-# Parts of a change that count as none: of coordinates that may be free; of what is held, by that of all coordinates or speeds,
-# and by all that changes anywhere.
-FREE, GAP, ROUNDING = 1e-8, 1e-6, 1e-10
 
 
 @dataclass(frozen=True)
@@ -123,5 +118,5 @@ class CarriedOn:
         sizes = np.maximum(np.abs(along), np.abs(result))[:middle]
         for k in self.indices:
             size = sizes[:n_q] if k < n_q else sizes[n_q:]
-            if (np.abs(along[k] - result[k]) > np.maximum(GAP * size.max(axis=0), ROUNDING * sizes.max())).any():
+            if (np.abs(along[k] - result[k]) > np.maximum(GAP * size.max(axis=0), GAP_OF_ALL * sizes.max())).any():
                 raise EvaluationError(f"{module.name}: at t = {self.t:.9g} s {not_smooth(module.metadata.x[k])}")

@@ -45,6 +45,7 @@ from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.shared_forces import least_solution
 from symdyn.runtime.stronge import stronge
+from symdyn.thresholds import FLIGHT
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -1339,7 +1340,7 @@ class _Phases:
             lam[indices] = result[0].lam if result else 0.0
         w = at.free + at.D @ lam
         begin, end = self.request.span
-        shortest = max(SHORTEST_FLIGHT * (end - begin), 1e4 * np.finfo(float).eps * abs(t))
+        shortest = max(SHORTEST_FLIGHT * (end - begin), FLIGHT * np.finfo(float).eps * abs(t))
         resting = []
         for k in rebound:
             row, e = self.normal[k], float(at.restitution[k])

@@ -13,8 +13,11 @@ from symdyn.real_numbers import number_of
 from symdyn.runtime.constraints import as_velocities, length, names
 from symdyn.shown import shown
 from symdyn.thresholds import (
+    CLOSED,
+    DEPENDENT,
     EXACT,
     FAILED,
+    HOLDS,
     LEFT,
     NOTICED,
     PART_OF_SIZE,
@@ -162,11 +165,11 @@ class Projector:
         allowed = TOO_MUCH_SPEED if of_speeds else max(TOO_MUCH_POSITION,
                                                        FAILED * RESOLVED * sizes[:self.n_q].max() / self.length)
         worst = np.inf
-        for _ in range(ROUNDS + 1):
+        for k in range(ROUNDS + 1):
             gaps = (wanted - x)[indices]
             before, parts = worst, np.abs(gaps) * factors[indices] / size
             worst, entry, left = float(parts.max()), indices[int(parts.argmax())], float(np.abs(gaps)[int(parts.argmax())])
-            if worst <= 1e-15 or worst > SHRINKS * before:
+            if worst <= CLOSED or worst > SHRINKS * before or k == ROUNDS:
                 break
             try:
                 directions = self.directions(t, x)[rows]
@@ -187,9 +190,9 @@ class Projector:
         factors, n = np.concatenate([self.lengths, self.velocities]), len(indices)
         own = np.diag(directions[:, indices]) * factors[indices]
         # Directions that would take the others a million times as far are held by the constraints.
-        free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
+        free = np.flatnonzero(HOLDS * own > np.abs(directions * factors).max(axis=1))
         result = np.zeros((n, *gaps.shape[1:]))
-        result[free] = _multipliers(directions[free][:, np.array(indices)[free]].T, gaps[free])
+        result[free] = solve_open(directions[free][:, np.array(indices)[free]].T, gaps[free])[0]
         return result
 
     def step(self, t: float, x: np.ndarray, start: np.ndarray, atol: np.ndarray, rtol: float) -> tuple[np.ndarray, bool]:
@@ -293,13 +296,31 @@ def not_smooth(entry: str) -> str:
             "has no derivative; reset as many as determine all others, or all of them to a position on the constraints")
 
 
-def _multipliers(G: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """mu (n, ...) with G mu = gaps, as well as it can be, for a positive semidefinite G: scaled to a diagonal of ones."""
-    if not len(gaps):
-        return gaps
-    factors = 1 / np.sqrt(np.diag(G))
-    result: np.ndarray = (factors * np.linalg.lstsq(G * np.outer(factors, factors), (factors * gaps.T).T, rcond=1e-10)[0].T).T
-    return result
+def solve_open(G: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """f (n, ...) with G f = gaps for a positive semidefinite G, and the rows in the order in which they are taken: by elimination
+    with the largest pivots, each relative to its entry of the diagonal. Rows that follow from others get zeros. Step by step what
+    c/runtime/pivots.h does."""
+    G, f, sizes, left, taken = G.copy(), gaps.astype(float), np.diag(G).tolist(), list(range(len(G))), list[int]()
+    while left:
+        most, best = DEPENDENT, -1
+        for i in left:
+            if G[i, i] > most * sizes[i]:
+                most, best = G[i, i] / sizes[i], i
+        if best < 0:
+            break
+        left.remove(best)
+        taken.append(best)
+        for i in left:
+            factor = G[i, best] / G[best, best]
+            f[i] -= factor * f[best]
+            G[i] -= factor * G[best]
+    for k in range(len(taken) - 1, -1, -1):
+        i = taken[k]
+        for other in taken[k + 1:]:
+            f[i] -= G[i, other] * f[other]
+        f[i] /= G[i, i]
+    f[left] = 0.0
+    return f, taken
 
 
 def chosen_gain(trial: Callable[[], np.ndarray], span: tuple[float, float]) -> float:
