@@ -36,6 +36,8 @@ OFF, FREE, GAP, GAP_OF_ALL = 1e-9, 1e-8, 1e-6, 1e-10
 AT_ONCE = 1e-14
 # So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
 CHATTER, MOST_RESETS = 1e-10, 5
+# Zeros of events: two ends as close as so many roundings of the time are one; secants, after which ends are halved.
+CLOSE, MOST_SECANTS, MOST_HALVINGS = 4.0, 100, 100
 
 # Flights of rigid contacts shorter than so many roundings of the time are not followed.
 FLIGHT = 1e4

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import math
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.library import CLibrary
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.integrating.compiled import Run
+from symdyn.runtime.integrating.events import zero_between
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.runtime.integrating.run_record import STATUS
 from symdyn.runtime.integrating.simulate import start_of
@@ -28,6 +31,8 @@ from symdyn.runtime.integrating.stabilization import (
     solve_open,
 )
 from symdyn.runtime.module import Module
+from symdyn.thresholds import AT_ONCE
+from tests.backend.c_warnings import RUNTIME
 from tests.c_rows import needs_c, rows_in_c
 from tests.runtime.constrained import equations
 
@@ -221,3 +226,93 @@ def test_states_after_resets_are_put_onto_constraints_alike(name: str, seed: int
         assert status[k] == 0
         assert np.abs(result - x[k]).max() <= 1e-10 * (1 + np.abs(x[k]).max())
     assert counts[0] > RESETS // 4 and counts[STATUS.RESET_REJECTED] > RESETS // 10
+
+
+# -- zeros of events
+
+ZEROS = """
+#include "prelude.h"
+typedef double symdyn_time;
+typedef struct {
+    struct {
+        double side[1];
+    } events;
+    const double *of;
+} symdyn_run;
+enum { SYMDYN_N_EVENTS = 1, SYMDYN_NX = 1 };
+static const double symdyn_eps = 2.220446049250313e-16;
+static int symdyn_state_at(symdyn_run *run, symdyn_time s, double *x) {
+    (void)run;
+    x[0] = s;
+    return 0;
+}
+static int symdyn_event_values(symdyn_run *run, double t, const double *x, double *values) {
+    const double *const c = run->of;
+    values[0] = c[0] == 0.0 ? ((c[1] * t + c[2]) * t + c[3]) * t + c[4]
+        : c[0] == 1.0       ? sin(c[1] * t + c[2]) - c[3]
+        : c[0] == 2.0       ? exp(c[1] * t) - c[2] - c[3] * t
+                            : (t - c[1]) * (t - c[1]) * (t - c[2]) * c[3];
+    return x[0] != t;
+}
+FUNCTION
+static int zero(const double *in, double *out) {
+    symdyn_run run = {{{in[9]}}, in};
+    return symdyn_event_root(&run, 0, in[5], in[6], in[7], in[8], in[10], out);
+}
+"""
+CUT = re.compile(r"^static int symdyn_event_root\(.*?^}$", re.MULTILINE | re.DOTALL)
+
+
+def quantity(c: np.ndarray, t: float) -> float:
+    """Of ZEROS: a cubic, a sine, an exponential, a cubic with a double zero."""
+    kind, c1, c2, c3, c4 = c[:5].tolist()
+    if kind == 0:
+        return ((c1 * t + c2) * t + c3) * t + c4
+    if kind == 1:
+        return math.sin(c1 * t + c2) - c3
+    if kind == 2:
+        return math.exp(c1 * t) - c2 - c3 * t
+    return (t - c1) * (t - c1) * (t - c2) * c3
+
+
+def of_zeros(n: int) -> np.ndarray:
+    """Quantities with their intervals, forwards and backwards, values at the ends times the side, the side, and what counts as
+    one time, (n, 11): simple zeros, double ones, at the ends and next to them, and where the interval begins at one."""
+    stream, rows = np.random.default_rng(3), []
+    while len(rows) < n:
+        kind, h = float(stream.integers(4)), 10.0 ** stream.uniform(-6, 0.5) * float(stream.choice([-1.0, 1.0]))
+        a = float(stream.choice([0.0, 1.0, 100.0])) * float(stream.normal())
+        b = a + h
+        part = float(stream.choice([0.0, 1.0, stream.uniform(), 10.0 ** stream.uniform(-16, -1)]))
+        zero = a + part * h
+        c1, c2, c3 = stream.normal(size=3).tolist()
+        if kind == 3:
+            c = [c1 if stream.uniform() < 0.3 else zero, zero if stream.uniform() < 0.5 else a + stream.uniform() * h, c3, 0.0]
+        elif kind == 2:
+            c = [c1, math.exp(c1 * zero) - c3 * zero, c3, 0.0]
+        elif kind == 1:
+            c1 *= 3 / abs(h)
+            c = [c1, c2, math.sin(c1 * zero + c2), 0.0]
+        else:
+            c = [c1, c2, c3, -((c1 * zero + c2) * zero + c3) * zero]
+        row = np.array([kind, *c, a, b, 0.0, 0.0, 0.0, AT_ONCE * 10.0 ** stream.uniform(-1, 2)])
+        at_a, at_b = quantity(row, a), quantity(row, b)
+        side = float(np.sign(at_a) or -np.sign(at_b))
+        row[7:10] = side * at_a, side * at_b, side
+        if side and row[8] <= 0:
+            rows.append(row)
+    return np.array(rows)
+
+
+@pytest.mark.native
+@needs_c
+def test_zeros_of_events_are_the_same(tmp_path: Path) -> None:
+    """The same bits over ten thousand quantities; before a zero a quantity has its side, at it no more."""
+    rows, text = of_zeros(10_000), (RUNTIME / "events.h").read_text(encoding="utf-8")
+    (function,) = CUT.findall(text)
+    found, failed = rows_in_c(tmp_path, ZEROS.replace("FUNCTION", function), "zero(", 11, 1)(rows)
+    assert not failed.any() and (rows[:, 7] == 0).sum() > 500 and (rows[:, 8] == 0).sum() > 500
+    for row, (root,) in zip(rows, found.tolist(), strict=True):
+        a, b, at_a, at_b, side, least = row[5:].tolist()
+        assert zero_between(lambda t, c=row, s=side: quantity(c, t) * s, a, b, at_a, at_b, least) == root
+        assert min(a, b) <= root <= max(a, b) and (root == a or side * quantity(row, root) <= 0)

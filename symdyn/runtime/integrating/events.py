@@ -12,7 +12,7 @@ from symdyn.contact_kinds import RELEASES, TOUCHES
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.integrating.stabilization import Projector
 from symdyn.shown import LENGTH, name_of
-from symdyn.thresholds import AT_ONCE, CHATTER, MOST_RESETS
+from symdyn.thresholds import AT_ONCE, CHATTER, CLOSE, MOST_HALVINGS, MOST_RESETS, MOST_SECANTS
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -150,8 +150,31 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
             "not seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
 
 
+def zero_between(value: Callable[[float], float], a: float, b: float, at_a: float, at_b: float, least: float) -> float:
+    """Where a quantity that is positive at a, or zero where the step begins at its zero, leaves its side before b, by regula
+    falsi with halved ends (Illinois). Step by step what symdyn_event_root of c/runtime/events.h does.
+
+    at_a, at_b   its values there; least: times that are closer count as one
+    """
+    last = 0
+    for k in range(MOST_SECANTS + MOST_HALVINGS):
+        close = CLOSE * np.finfo(float).eps * max(abs(a), abs(b))
+        inside = close if b > a else -close
+        if abs(b - a) <= close or at_b == 0.0 or (at_a <= 0.0 and abs(b - a) <= least):
+            break
+        s = b - at_b * (b - a) / (at_b - at_a) if at_a > 0.0 and k < MOST_SECANTS else 0.5 * (a + b)
+        if not (abs(s - a) > 0.25 * close and abs(s - b) > 0.25 * close):
+            s = a + inside if abs(s - a) < abs(s - b) else b - inside
+        here = value(s)
+        if here > 0.0:
+            a, at_a, at_b, last = s, here, at_b * (0.5 if last == 1 else 1.0), 1
+        else:
+            b, at_b, at_a, last = s, here, at_a * (0.5 if last == -1 else 1.0), -1
+    return a if at_a <= 0.0 and abs(b - a) <= least else b
+
+
 class Locator:
-    """Looks for events in the steps of a run: the algorithm is that of c/runtime/events.h.
+    """Looks for events in the steps of a run, step by step as c/runtime/events.h does.
 
     p        parameters; look: which events, (n_e,) of bool; given: inputs at (t, x)
     n_state  entries of x that are the mechanism's state; span: of the run, s; spacing: of samples at the most, s, 0: any
@@ -372,23 +395,14 @@ class Locator:
         leaves = self.look & (self.side != 0) & (self.side == self.leaving)
         self.leaving = np.where((self.side != 0) & ~leaves, 0.0, self.leaving)
         passed = self.look & ~leaves & (self.side != 0) & (now != self.side) & np.isin(self.direction * self.side, (0, -1))
-        roots = {int(k): self._root(int(k), left, right, between) for k in np.flatnonzero(passed)}
+        roots = {k: self._root(k, left, right, samples, between) for k in np.flatnonzero(passed).tolist()}
         return roots | {int(k): left for k in np.flatnonzero(leaves)}
 
-    def _root(self, k: int, left: float, right: float, between: Between) -> float:
+    def _root(self, k: int, left: float, right: float, samples: np.ndarray, between: Between) -> float:
         """The zero of one quantity, which leaves its side between left and right."""
-        from scipy.optimize import brentq
-
-        def value(s: float) -> float:
-            return float(self.values(s, between(s))[k]) * self.side[k]
-
-        a, b = left, right
-        while value(a) <= 0:  # it begins at its zero: the quantity comes back to it after a while, or at once
-            if abs(b - a) <= self.resolution:
-                return left
-            middle = 0.5 * (a + b)
-            a, b = (middle, b) if value(middle) > 0 else (a, middle)
-        return float(brentq(value, a, b, xtol=max(4e-16 * abs(b), 1e-300), rtol=1e-15)) if value(b) < 0 else b
+        side = float(self.side[k])
+        return zero_between(lambda s: float(self.values(s, between(s))[k]) * side, left, right, side * float(samples[0, k]),
+                            side * float(samples[panels.N - 1, k]), self.resolution)
 
     def _note(self, roots: dict[int, float], t_old: float, t_new: float, between: Between) -> float:
         t = min(roots.values(), key=lambda s: abs(s - t_old))
