@@ -6,8 +6,7 @@ Residuals of positions count by the mechanism's length, of speeds by the largest
 from __future__ import annotations
 
 # Singular values of what forces along rows make along them, D = J M^-1 J^T, below this part of the largest, and pivots below this
-# part of the entries of the diagonal: rows that depend on each other. RANK in
-# symdyn/tape/intrinsics.py is for J itself.
+# part of the entries of the diagonal: rows that depend on each other. RANK in symdyn/tape/intrinsics.py is for J itself.
 DEPENDENT = 1e-10
 
 # Projections. What rounding leaves of positions and speeds, and from which on a projection has failed.
@@ -34,8 +33,8 @@ OFF, FREE, GAP, GAP_OF_ALL = 1e-9, 1e-8, 1e-6, 1e-10
 
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14
-# So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
-CHATTER, MOST_RESETS = 1e-10, 5
+# So many resets, each within so many of these times after the one before: the motion comes to rest there, or chatters.
+NEAR, MOST_RESETS = 1e4, 5
 # Zeros of events: two ends as close as so many roundings of the time are one; secants, after which ends are halved.
 CLOSE, MOST_SECANTS, MOST_HALVINGS = 4.0, 100, 100
 

@@ -324,14 +324,14 @@ class Integrator:
     gathered    what the template of the method gets of its own: coefficients, or functions of a series
     functions   what it calls at t and x, each with `called`, `name`, `call`, `inputs`, `signature`; `bounded`: for bounds in
                 place of t and x; `weighted`: with weights besides
-    macros      pairs of a macro and its value: sizes
+    macros      pairs of a macro and its value: sizes, thresholds
     """
 
     method: Method
     shape: Shape
     gathered: Gathered
     functions: tuple[Integrated, ...]
-    macros: tuple[tuple[str, int], ...]
+    macros: tuple[tuple[str, float], ...]
 
     @property
     def events(self) -> Sequence[EventRecord]:

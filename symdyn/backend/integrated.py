@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from symdyn.backend import thresholds
 from symdyn.backend.band import Band
 from symdyn.backend.gathered import Gathered
 from symdyn.backend.metadata import EventRecord
@@ -115,12 +116,12 @@ def functions(needs: Sequence[str], arguments_of: Mapping[str, Sequence[str]], c
     return at + [Integrated(f"{name}_of", name, call(name, "out"), False, True) for name in OF_BOUNDS if name in arguments_of]
 
 
-def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, int]]:
-    """Macros of the sizes that the parts read, and of switches that they read as numbers.
+def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, float]]:
+    """Macros of the sizes and thresholds that the parts read, and of switches that they read as numbers.
 
     gathered   what the method's template gets besides
     """
-    result = [("SYMDYN_NX", shape.n_x), ("SYMDYN_NQ", shape.sizes["q"]), ("SYMDYN_NU", shape.sizes["u"]),
+    result: list[tuple[str, float]] = [("SYMDYN_NX", shape.n_x), ("SYMDYN_NQ", shape.sizes["q"]), ("SYMDYN_NU", shape.sizes["u"]),
               ("SYMDYN_NIN", shape.sizes["inputs"]), ("SYMDYN_ORDER", method.order),
               ("SYMDYN_SLOPE_AT_END", int(method.slope_at_end))]
     if method.tableau is not None:
@@ -147,6 +148,11 @@ def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, i
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))
+    result += thresholds.MOVES if shape.projects else ()
+    result += thresholds.PROJECTIONS if shape.n_rows else ()
+    result += thresholds.EVENTS if shape.events else ()
+    result += thresholds.RESETS if shape.held else ()
+    result += thresholds.PIVOTS if shape.events and (shape.held or shape.columns) else ()
     return result
 
 

@@ -7,6 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from symdyn.backend import thresholds
+from symdyn.backend.gathered import Gathered
+from symdyn.backend.integrated import Shape, sizes
+from symdyn.backend.metadata import EventRecord
+from symdyn.backend.methods import METHODS
 from symdyn.backend.parts import Parts
 from symdyn.errors import SymdynError
 
@@ -77,6 +82,19 @@ def test_comments_of_written_files_name_no_other_files() -> None:
     assert len(texts) > 45
     dangling = re.compile(r"//.*\b\w+\.(?:h|c|py|jinja)\b")
     assert [(name, line) for name, text in texts.items() for line in text.splitlines() if dangling.search(line)] == []
+
+
+def test_thresholds_that_python_has_too_are_macros() -> None:
+    """C has none of their numbers; the macros have the values of the constants."""
+    macros = dict(sum((thresholds.EVENTS, thresholds.MOVES, thresholds.PROJECTIONS, thresholds.RESETS, thresholds.PIVOTS), ()))
+    texts = {name: re.sub("//.*", "", (RUNTIME / name).read_text(encoding="utf-8"))
+             for name in ("projection.h", "pivots.h", "resets.h", "events.h")}
+    numbers = r"(?<![\w.-])(?:1e-14|1e4|1e-13|9e-16|3\.6e-15|4e-16|0\.7|1e-15|1e-3|13|12)(?![\w.])"
+    assert {name: re.findall(numbers, text) for name, text in texts.items()} == {name: [] for name in texts}
+    read = set(re.findall(r"\bSYMDYN_\w+", "".join(texts.values())))
+    assert set(macros) <= read and len(macros) == 19
+    shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), [EventRecord("a", 0, False, (2,), False, (), ())], (), True)
+    assert macros.items() <= dict(sizes(METHODS["dop853"], shape, Gathered())).items()
 
 
 @pytest.mark.parametrize("path", sorted(RUNTIME.iterdir()), ids=lambda path: path.name)

@@ -27,7 +27,7 @@ from symdyn.runtime.integrating.short_steps import ShortSteps
 from symdyn.runtime.integrating.stabilization import TOO_FAR, Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
-from symdyn.thresholds import CHATTER
+from symdyn.thresholds import AT_ONCE, NEAR
 
 if TYPE_CHECKING:
     from symdyn.runtime.building.library import CLibrary
@@ -324,7 +324,7 @@ def _message(module: Module, run: Run, status: int, report: Report, interrupted:
     if stopped:
         return describe_stop(metadata, t, x, f"{of.n_steps} steps were done, as asked")
     if status == STATUS.EVENT_AT_ONCE:
-        near = CHATTER * abs(run.request.span[1] - run.request.span[0])
+        near = NEAR * AT_ONCE * abs(run.request.span[1] - run.request.span[0])
         return describe_stop(metadata, t, x, at_once(module, run.happened, near))
     if status == STATUS.EVENT_FAILED:
         why = run.library.reason(of.reason) if of.reason else not_known(module, of.bad_index)

@@ -58,6 +58,8 @@ TOUCHING = 1e-9
 TOGETHER = 1e-11
 # A flight shorter than this part of the run is one of infinitely many that end in finite time (Zeno): the contact stays closed.
 SHORTEST_FLIGHT = 1e-10
+# So is one shorter than so many times t, in which times are not resolved.
+RESOLVED_FLIGHT = FLIGHT * float(np.finfo(float).eps)
 # So is one that rises less than this part of the size of the coordinates: rounding hides when it ends.
 LOWEST_FLIGHT = 1e-12
 # Gaps of open contacts below minus this part of that size have been missed.
@@ -75,7 +77,7 @@ STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Energy that an impact adds counts from this part of its work on.
 GAINED = 1e-9
 CODE_OF = {mode: k for k, mode in enumerate(MODES)}
-LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, LOWEST_FLIGHT)
+LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, RESOLVED_FLIGHT, LOWEST_FLIGHT)
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
 # Part of the run for which a contact that has opened without a speed is near enough to count as leaving.
@@ -1340,7 +1342,7 @@ class _Phases:
             lam[indices] = result[0].lam if result else 0.0
         w = at.free + at.D @ lam
         begin, end = self.request.span
-        shortest = max(SHORTEST_FLIGHT * (end - begin), FLIGHT * np.finfo(float).eps * abs(t))
+        shortest = max(SHORTEST_FLIGHT * (end - begin), RESOLVED_FLIGHT * abs(t))
         resting = []
         for k in rebound:
             row, e = self.normal[k], float(at.restitution[k])

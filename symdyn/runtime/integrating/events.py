@@ -12,7 +12,7 @@ from symdyn.contact_kinds import RELEASES, TOUCHES
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.integrating.stabilization import Projector
 from symdyn.shown import LENGTH, name_of
-from symdyn.thresholds import AT_ONCE, CHATTER, CLOSE, MOST_HALVINGS, MOST_RESETS, MOST_SECANTS
+from symdyn.thresholds import AT_ONCE, CLOSE, MOST_HALVINGS, MOST_RESETS, MOST_SECANTS, NEAR
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -418,7 +418,7 @@ class Locator:
         self.side[fresh], self.leaving[events] = -self.side[fresh], 0.0
         self.happened += [Happened(k, t, before, before) for k in events]
         if any(self.records[k].reset for k in events):
-            near = abs(t - self.latest) <= CHATTER / AT_ONCE * self.resolution
+            near = abs(t - self.latest) <= NEAR * self.resolution
             self.repeated, self.latest = MOST_RESETS if again else self.repeated + 1 if near else 1, t
             earlier = t - min(1e-6 * abs(t_new - t_old), abs(t - t_old)) * np.sign(t_new - t_old)
             self.change = self.left - self.values(earlier, between(earlier))
@@ -426,5 +426,5 @@ class Locator:
         if stopping:
             self.over = ended(self.module, stopping[0], t)
         elif self.repeated >= MOST_RESETS:
-            self.failed = at_once(self.module, self.happened, CHATTER / AT_ONCE * self.resolution)
+            self.failed = at_once(self.module, self.happened, NEAR * self.resolution)
         return t

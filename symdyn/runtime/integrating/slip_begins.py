@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+# Times below this part of t are not resolved.
+RESOLVED = 64 * float(np.finfo(float).eps)
 # Slip up to which directions are held, by what the tolerances let pass and by rounding of the speeds.
 TOLERATED, ROUNDED = 10.0, 1e4 * np.finfo(float).eps
 # The shortest time until then, the first guess and the longest, by the length of the run; by how much guesses grow at most, how
@@ -48,7 +50,7 @@ class SlipBegins:
                    slips: Callable[[float, np.ndarray], Mapping[int, np.ndarray]], tolerated: float) -> float:
         """Until when directions are held; rate: x_dot with them, slips: of contacts at a state, tolerated: an error of these."""
         wanted = TOLERATED * tolerated + ROUNDED * float(np.abs(x).max(initial=0.0))
-        shortest = max(SHORTEST * self.length, 64 * np.finfo(float).eps * abs(t))
+        shortest = max(SHORTEST * self.length, RESOLVED * abs(t))
         after, most = max(GUESS * self.length, shortest), LONGEST * self.length
         f = rate(t, x)
         for _ in range(GUESSES):

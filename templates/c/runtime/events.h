@@ -692,9 +692,8 @@ __attribute__((noinline)) static int symdyn_event_far(symdyn_run *run) {
 // Search the latest step for events: note them, and end the step at the first that stops the motion or changes its state.
 // Panels are divided until it is certain what happens in each, the rest of the step waiting in `ends`.
 __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
-    enum { DEPTH = 64 };  // of halves of halves: no more than 46 are longer than twice 1e-14 of the span
-    const double least =
-        1e-14 * run->h_floor / (symdyn_eps * symdyn_eps);  // times that are closer count as one: 1e-14 of the span
+    enum { DEPTH = 64 };  // of halves of halves: no more than 46 are longer than twice the least time
+    const double least = SYMDYN_AT_ONCE * run->h_floor / (symdyn_eps * symdyn_eps);  // times that are closer count as one
     double left = run->t_old, ends[DEPTH] = {run->t}, v[SYMDYN_PANEL + 1][SYMDYN_N_EVENTS];
     double states[SYMDYN_PANEL + 1][SYMDYN_NX], xd[SYMDYN_NX], *const x = states[SYMDYN_PANEL - 1];
     int failure = 0, n = 1;
@@ -795,7 +794,9 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
         if (failure) break;
         if (resets) {
             // Again at once, although its reset sends it away from zero: it goes less far than is resolved.
-            run->events.at_once = again ? 5 : fabs(first - run->events.t) <= 1e4 * least ? run->events.at_once + 1 : 1;
+            run->events.at_once = again                              ? SYMDYN_MOST_RESETS
+                : fabs(first - run->events.t) <= SYMDYN_NEAR * least ? run->events.at_once + 1
+                                                                     : 1;
             run->events.t = first;
         }
         for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
@@ -810,7 +811,7 @@ __attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
             run->events.resetting = resets != 0;
             for (int i = 0; i < SYMDYN_NX; i++) run->x[i] = x[i];
             run->status = first == run->t_end ? SYMDYN_DONE : SYMDYN_STEP_LIMIT;
-            if (cut || run->events.at_once >= 5) run->status = cut ? SYMDYN_STOPPED : SYMDYN_EVENT_AT_ONCE;
+            if (cut || run->events.at_once >= SYMDYN_MOST_RESETS) run->status = cut ? SYMDYN_STOPPED : SYMDYN_EVENT_AT_ONCE;
             if (cut || !resets) return;
             // Changes of the quantities in a small step before.
             const double earlier = first - run->direction * fmin(1e-6 * fabs(run->h_old), fabs(first - run->t_old));

@@ -237,7 +237,7 @@ static int symdyn_choose(symdyn_hybrid *h, int n, const int *contact, double *ac
 static int symdyn_flight_is_short(const symdyn_hybrid *h, int k, double acceleration) {
     const symdyn_numbers at = symdyn_parts(h);
     const double speed = at.slip[h->first[k]], flight = -2.0 * speed / acceleration;
-    const double shortest = fmax(h->shortest_flight * (h->end - h->begin), 1e4 * 2.220446049250313e-16 * fabs(h->t));
+    const double shortest = fmax(h->shortest_flight * (h->end - h->begin), h->resolved_flight * fabs(h->t));
     if (!(acceleration < 0.0) || at.of_contact[4 * k + 3] >= 1.0) return 0;
     return flight < shortest || 0.25 * flight * speed < h->lowest_flight * h->size;
 }
@@ -406,13 +406,13 @@ static int symdyn_rate_at(symdyn_hybrid *h, double t, const double *x) {
 // Until when the directions of slips that begin are held; p: the parameters with the modes.
 static int symdyn_held_until(symdyn_hybrid *h, const double *p, double *until) {
     const symdyn_numbers at = symdyn_parts(h);
-    const double length = h->end - h->begin, eps = 2.220446049250313e-16;
+    const double length = h->end - h->begin;
     double wanted = 0.0, *const slope = h->states, *const ahead = h->ahead;
     if (!h->rate || symdyn_tolerated(h, &wanted)) return SYMDYN_LEFT;
     for (int i = 0; i < h->n_p; i++) h->rate_p[i] = p[i];
     if (h->rate_prologue(h->rate_p, h->rate_c) || !symdyn_all_finite(h->rate_c, h->n_rate_c)) return SYMDYN_LEFT;
     wanted = h->tolerated * wanted + h->rounded * symdyn_most(h->x, h->n_state);
-    const double shortest = fmax(h->shortest * length, 64.0 * eps * fabs(h->t)), most = h->longest * length;
+    const double shortest = fmax(h->shortest * length, h->resolved * fabs(h->t)), most = h->longest * length;
     double after = fmax(h->guess * length, shortest);
     if (symdyn_rate_at(h, h->t, h->x)) return SYMDYN_LEFT;
     for (int i = 0; i < h->n_state; i++) slope[i] = h->of_rate[i];

@@ -36,10 +36,11 @@ typedef struct {
     double begin, end, same, rtol, first_step, max_step, spacing;
     const double *atol;
     long most_steps;  // attempted, of one phase, and of one call
-    double touching, together, missed, no_speed, noise, dependent, different, energy, shortest_flight, lowest_flight, far;
+    double touching, together, missed, no_speed, noise, dependent, different, energy;
+    double shortest_flight, resolved_flight, lowest_flight, far;
 
     // Beginnings of slips, see symdyn/runtime/integrating/slip_begins.py.
-    double tolerated, rounded, shortest, guess, longest, grows, larger;
+    double tolerated, rounded, shortest, resolved, guess, longest, grows, larger;
     int guesses;
 
     // Where it is: before a switch, if it begins or events have fired, else before a phase.

@@ -7,7 +7,7 @@
 static int symdyn_solve_open(int m, double *G, const double *sizes, double *gap, int *open, int *order) {
     int n = 0;
     for (int best = 0; best >= 0;) {
-        double most = 1e-10;
+        double most = SYMDYN_DEPENDENT;
         best = -1;
         for (int i = 0; i < m; i++)
             if (open[i] && G[m * i + i] > most * sizes[i]) {

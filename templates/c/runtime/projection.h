@@ -25,18 +25,17 @@ static int symdyn_reason_of(symdyn_run *run, int reason, const double *out, int 
 }
 
 // Rest after a projection: largest residuals of positions and speeds, relative to the length and to the largest speed, and what
-// rounding may leave of positions: 1e-13, or 4 eps |q| / length where that is more. Coordinates are known to eps |q| only, |q|
-// the largest of them in m (angles times the length), so that far away the residuals are no smaller; within 100 lengths or rad
-// nothing of this is felt. Residuals are too large above 1e-9 and four times the rounding, of speeds above 1e-8. The first that
-// does is noted.
+// rounding may leave of positions: SYMDYN_ROUNDING, or 4 eps |q| / length where that is more. Coordinates are known to eps |q|
+// only, |q| the largest of them in m (angles times the length), so that far away the residuals are no smaller; within 100 lengths
+// or rad nothing of this is felt. The first that is too large, of positions also above four times the rounding, is noted.
 static int symdyn_left(symdyn_run *run, double t, const double *x, double *left, double *rounding) {
     const double length = run->problem.length, *u = x + SYMDYN_NQ;
-    double speed = 1e-5 * length, far = 0.0, out[2 * SYMDYN_ROWS];
+    double speed = SYMDYN_SLOWEST * length, far = 0.0, out[2 * SYMDYN_ROWS];
     const int reason = symdyn_violation_at(&run->problem, t, x, out);
     if (symdyn_reason_of(run, reason, out, 2 * SYMDYN_ROWS)) return 1;
     for (int i = 0; i < SYMDYN_NU; i++) speed = fmax(speed, fabs(u[i]) * (symdyn_turning[i] ? length : 1.0));
     for (int i = 0; i < SYMDYN_NQ; i++) far = fmax(far, fabs(x[i]) * (symdyn_angles[i] ? length : 1.0));
-    *rounding = fmax(1e-13, 9e-16 * far / length);
+    *rounding = fmax(SYMDYN_ROUNDING, SYMDYN_RESOLVED * far / length);
     run->worst = run->of_speeds = -1;
     for (int k = 0; k < 2; k++) {
         const double scale = k ? speed : length, *const row = out + SYMDYN_ROWS * k;
@@ -47,7 +46,8 @@ static int symdyn_left(symdyn_run *run, double t, const double *x, double *left,
                 left[k] = fabs(row[i]) / scale;
                 most = i;
             }
-        if (left[k] > (k ? 1e-8 : fmax(1e-9, 4.0 * (*rounding))) && run->of_speeds < 0) {
+        if (left[k] > (k ? SYMDYN_TOO_MUCH_OF_SPEEDS : fmax(SYMDYN_TOO_MUCH, SYMDYN_FAILED_TIMES * *rounding))
+            && run->of_speeds < 0) {
             run->residual = left[k] * scale;
             run->worst = most;
             run->of_speeds = k;
@@ -63,7 +63,7 @@ static int symdyn_correct_positions(symdyn_run *run, double t, double *x) {
     const int reason = symdyn_position_correction_at(&run->problem, t, x, out);
     if (symdyn_reason_of(run, reason, out, SYMDYN_ROWS + SYMDYN_NQ)) return 1;
     for (int i = 0; i < SYMDYN_ROWS; i++) residual = fmax(residual, fabs(out[i]));
-    if (!(residual > 4e-16 * run->problem.length)) return 0;
+    if (!(residual > SYMDYN_SOLVED * run->problem.length)) return 0;
     for (int i = 0; i < SYMDYN_NQ; i++) x[i] += out[SYMDYN_ROWS + i];
 #if SYMDYN_HAS_UNIT_GROUPS
     symdyn_normalise(x);
@@ -71,7 +71,7 @@ static int symdyn_correct_positions(symdyn_run *run, double t, double *x) {
     return 0;
 }
 
-// The smallest change of the speeds that makes C_u u + C_t = 0.
+// The smallest change of the speeds that makes C_r u + C_t = 0.
 static int symdyn_correct_speeds(symdyn_run *run, double t, double *x) {
     double out[SYMDYN_ROWS + SYMDYN_NU];
     run->n_corrections++;
@@ -84,13 +84,14 @@ static int symdyn_correct_speeds(symdyn_run *run, double t, double *x) {
 // Corrections of positions, while they are off by more than rounding, each with one of the speeds, until residuals are at
 // rounding level, or shrink no further. Returns 0, or 1 if that is too early, or there is no such correction.
 static int symdyn_corrections(symdyn_run *run, double t, double *x) {
-    double left[2] = {1e300, 1e300}, rounding = 1e-13;
-    for (int k = 0, shrinks = 1; k < 12 && shrinks; k++) {
+    double left[2] = {1e300, 1e300}, rounding = SYMDYN_ROUNDING;
+    for (int k = 0, shrinks = 1; k < SYMDYN_PROJECTION_ROUNDS && shrinks; k++) {
         const double before[2] = {left[0], left[1]};
         if (left[0] > rounding && symdyn_correct_positions(run, t, x)) return 1;
         if (symdyn_correct_speeds(run, t, x)) return 1;
         if (symdyn_left(run, t, x, left, &rounding)) return 1;
-        shrinks = (left[0] > rounding && left[0] < 0.7 * before[0]) || (left[1] > 1e-13 && left[1] < 0.7 * before[1]);
+        shrinks = (left[0] > rounding && left[0] < SYMDYN_SHRINKS * before[0])
+            || (left[1] > SYMDYN_ROUNDING && left[1] < SYMDYN_SHRINKS * before[1]);
     }
     return run->of_speeds >= 0;
 }
@@ -145,19 +146,20 @@ static int symdyn_move_end(symdyn_run *run, double t, double *x, int *moved) {
     run->moved = sqrt(symdyn_square(run, change, x));
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++) far[i >= SYMDYN_NQ] = fmax(far[i >= SYMDYN_NQ], fabs(x[i]));
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++)
-        *moved |=
-            fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * far[i >= SYMDYN_NQ];
+        *moved |= fabs(x[i] - run->x_end[i]) > SYMDYN_NOTICED * (run->atol[i] + run->rtol * fabs(x[i]))
+                + SYMDYN_NOTICED_ROUNDINGS * symdyn_eps * far[i >= SYMDYN_NQ];
 #if SYMDYN_SENSITIVE
     for (int i = SYMDYN_STATE; i < SYMDYN_NX; i++)
-        *moved |= fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * fabs(x[i]);
+        *moved |= fabs(x[i] - run->x_end[i])
+            > SYMDYN_NOTICED * (run->atol[i] + run->rtol * fabs(x[i])) + SYMDYN_NOTICED_ROUNDINGS * symdyn_eps * fabs(x[i]);
 #endif
     for (int i = 0; i < SYMDYN_NQ; i++) {
         way += (run->x_end[i] - run->x[i]) * (run->x_end[i] - run->x[i]);
         size += x[i] * x[i];
     }
-    double most = 0.5 * sqrt(way) + 1e-6 * sqrt(size);
+    double most = SYMDYN_PART_OF_WAY * sqrt(way) + SYMDYN_PART_OF_SIZE * sqrt(size);
 #if SYMDYN_HAS_CONSTRAINTS
-    most += 1e-6 * run->problem.length;
+    most += SYMDYN_PART_OF_SIZE * run->problem.length;
 #endif
     // More than half the way of the step is no correction but a jump, to another branch maybe.
     return run->dq > most ? symdyn_fail(run, SYMDYN_PROJECTION_FAILED, 0, -1, t, run->x_end) : 0;

@@ -12,8 +12,8 @@ static double symdyn_arm(const symdyn_run *run, int i) {
 
 // Close the gaps of the entries that are open, to first order: along the changes that forces along them make of x where the
 // constraints let them, by elimination with the largest pivots; gap then has these forces. Entries that others determine do not
-// count, nor those that would take the others a million times as far: the constraints hold them. The changed state is `of`: x, or
-// its derivative. Returns 0 or 1.
+// count, nor those that would take the others SYMDYN_RESET_HELD times as far: the constraints hold them. The changed state is
+// `of`: x, or its derivative. Returns 0 or 1.
 static int symdyn_close(symdyn_run *run, double t, const double *x, int *open, double *gap, double *of) {
     enum { WIDTH = SYMDYN_NQ + SYMDYN_NU };
     double rows[SYMDYN_HELD * WIDTH], G[SYMDYN_HELD][SYMDYN_HELD];
@@ -25,7 +25,7 @@ static int symdyn_close(symdyn_run *run, double t, const double *x, int *open, d
         sizes[i] = rows[WIDTH * i + symdyn_held[i]];
         for (int j = 0; j < SYMDYN_HELD; j++) G[i][j] = rows[WIDTH * j + symdyn_held[i]];
         for (int j = 0; j < WIDTH; j++) most = fmax(most, fabs(rows[WIDTH * i + j]) * symdyn_arm(run, j));
-        open[i] &= 1e6 * sizes[i] * symdyn_arm(run, symdyn_held[i]) > most;
+        open[i] &= SYMDYN_RESET_HELD * sizes[i] * symdyn_arm(run, symdyn_held[i]) > most;
     }
     const int n = symdyn_solve_open(SYMDYN_HELD, &G[0][0], sizes, gap, open, order);
     for (int k = n - 1; k >= 0; k--)
@@ -55,14 +55,14 @@ static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, do
 #endif
     for (int i = 0; i < SYMDYN_NU; i++) u[i] = x[SYMDYN_NQ + i];
     for (int speeds = 0; speeds < 2; speeds++) {
-        double worst = 1e300, left = 0.0, size = speeds ? 1e-5 * length : length, far = 0.0;
+        double worst = 1e300, left = 0.0, size = speeds ? SYMDYN_SLOWEST * length : length, far = 0.0;
         int which = 0;
         for (int i = 0; i < SYMDYN_NU; i++) x[SYMDYN_NQ + i] = u[i];
         if ((failure = symdyn_correct(run, t, x))) return failure;
         for (int i = 0; i < SYMDYN_NQ; i++) far = fmax(far, fabs(x[i]) * symdyn_arm(run, i));
         if (speeds)
             for (int i = SYMDYN_NQ; i < SYMDYN_NQ + SYMDYN_NU; i++) size = fmax(size, fabs(x[i]) * symdyn_arm(run, i));
-        for (int round = 0; round < 13; round++) {
+        for (int round = 0; round <= SYMDYN_PROJECTION_ROUNDS; round++) {
             const double before = worst;
             double gap[SYMDYN_HELD];
             int open[SYMDYN_HELD];
@@ -78,7 +78,7 @@ static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, do
                     left = fabs(gap[i]);
                 }
             }
-            if (worst <= 1e-15 * size || worst > 0.7 * before || round == 12) break;
+            if (worst <= SYMDYN_RESET_KEPT * size || worst > SYMDYN_SHRINKS * before || round == SYMDYN_PROJECTION_ROUNDS) break;
             if (symdyn_close(run, t, x, open, gap, x) || symdyn_correct(run, t, x)) {
                 worst = 1e300;
                 break;
@@ -88,7 +88,9 @@ static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, do
 #endif
         }
         run->events.reset_gap = left;
-        if (worst > size * (speeds ? 1e-8 : fmax(1e-9, 3.6e-15 * far / length)))
+        if (worst > size
+                * (speeds ? SYMDYN_TOO_MUCH_OF_SPEEDS
+                          : fmax(SYMDYN_TOO_MUCH, SYMDYN_FAILED_TIMES * SYMDYN_RESOLVED * far / length)))
             return symdyn_fail(run, SYMDYN_RESET_REJECTED, 0, symdyn_held[which], t, x_old);
     }
 #if SYMDYN_SENSITIVE
