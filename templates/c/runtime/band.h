@@ -2,6 +2,7 @@
 // Source: Golub, Van Loan, Matrix Computations, 4th ed., section 4.3.5; LAPACK, dgbtf2: where exchanges put further diagonals.
 #pragma once
 
+#include "complex_numbers.h"
 #include "prelude.h"
 
 // Numbers of a band of n rows, with `lower` and `upper` diagonals below and above the main one: column by column, each from row
@@ -43,9 +44,7 @@ static inline __attribute__((always_inline)) int symdyn_band_eliminate(
             }
         }
         if (B) {
-            const double part = fabs(a[0]) + fabs(b[0]), u = a[0] / part, v = b[0] / part, size = part * (u * u + v * v);
-            a[0] = u / size;
-            b[0] = -v / size;
+            symdyn_invert(a, b);
         } else {
             a[0] = 1.0 / a[0];
         }

@@ -271,16 +271,20 @@ static void symdyn_event_note(symdyn_run *run, int kind, int k, double t, const 
 }
 
 #if SYMDYN_SENSITIVE
+// A millionth of the time in which the state x changes away along a slope, with the sign of the direction.
+static double symdyn_short_time(const symdyn_run *run, const double *x, const double *slope) {
+    const double change = symdyn_square(run, slope, x), size = symdyn_square(run, x, x);
+    const double most = fmin(run->h_max, fabs(run->t_end - run->t_old)), there = change > 0.0 ? sqrt(size / change) : most;
+    return 1e-6 * run->direction * fmax(fabs(run->h_old), fmin(there, most));
+}
+
 // The right-hand side just before (way -1) or just after (way 1) an event at (t, x), where signs and conditions have the values
-// of that side: extrapolated from two states on the way, a millionth of the time in which the state changes away. Returns 0 or a
-// failure.
+// of that side: extrapolated from two states on the way, one and two short times away. Returns 0 or a failure.
 static int symdyn_one_sided_slope(symdyn_run *run, double t, const double *x, double way, double *slope) {
     double y[SYMDYN_NX], far[SYMDYN_NX];
     int failure = symdyn_eval(run, t, x, slope);
     if (failure) return failure;
-    const double change = symdyn_square(run, slope, x), size = symdyn_square(run, x, x);
-    const double most = fmin(run->h_max, fabs(run->t_end - run->t_old)), there = change > 0.0 ? sqrt(size / change) : most;
-    const double step = 1e-6 * run->direction * fmax(fabs(run->h_old), fmin(there, most)) * way;
+    const double step = symdyn_short_time(run, x, slope) * way;
     for (int k = 2; k > 0; k--)
         for (int round = 0; round < 3; round++) {  // the first ones go over to the side
             for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + k * step * slope[i];
@@ -425,9 +429,7 @@ static int symdyn_slope_between(
                 g[k][1 + begin + j] = along[k * WIDTH + 1 + j] - none[k * WIDTH + 1 + j];
     }
     if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
-    const double change = symdyn_square(run, slope, x), size = symdyn_square(run, x, x);
-    const double most = fmin(run->h_max, fabs(run->t_end - run->t_old)), there = change > 0.0 ? sqrt(size / change) : most;
-    const double step = 1e-6 * run->direction * fmax(fabs(run->h_old), fmin(there, most));
+    const double step = symdyn_short_time(run, x, slope);
     *clear = 1;
     for (int times = 2; times > 0; times--)
         for (int round = 0; round < 3; round++) {

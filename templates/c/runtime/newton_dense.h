@@ -1,6 +1,7 @@
 // The matrices of Newton's iteration with all entries, stored by columns.
 #pragma once
 
+#include "complex_numbers.h"
 #include "run.h"
 
 // Factorize A + i B with exchanges among the rows of coordinates, then among the others: entries stay zero where q_dot = u, and
@@ -22,9 +23,7 @@ static int symdyn_newton_factorize(double *A, double *B, int *order) {
             A[to] = p;
             B[to] = q;
         }
-        const double u = a[k] / most, v = b[k] / most, size = most * (u * u + v * v);
-        a[k] = u / size;
-        b[k] = -v / size;
+        symdyn_invert(a + k, b + k);
         for (int i = k + 1; i < SYMDYN_STATE; i++) {
             const double p = a[i];
             a[i] = p * a[k] - b[i] * b[k];
