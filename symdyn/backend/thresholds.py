@@ -5,7 +5,9 @@ from __future__ import annotations
 from symdyn import thresholds as limits
 
 Macros = tuple[tuple[str, float], ...]
-EVENTS: Macros = (("SYMDYN_AT_ONCE", limits.AT_ONCE), ("SYMDYN_NEAR", limits.NEAR), ("SYMDYN_MOST_RESETS", limits.MOST_RESETS))
+EVENTS: Macros = (
+    ("SYMDYN_AT_ONCE", limits.AT_ONCE), ("SYMDYN_NEAR", limits.NEAR), ("SYMDYN_MOST_RESETS", limits.MOST_RESETS),
+    ("SYMDYN_CLOSE", limits.CLOSE), ("SYMDYN_MOST_SECANTS", limits.MOST_SECANTS), ("SYMDYN_MOST_HALVINGS", limits.MOST_HALVINGS))
 MOVES: Macros = (
     ("SYMDYN_NOTICED", limits.NOTICED), ("SYMDYN_NOTICED_ROUNDINGS", limits.ROUNDINGS),
     ("SYMDYN_PART_OF_WAY", limits.PART_OF_WAY), ("SYMDYN_PART_OF_SIZE", limits.PART_OF_SIZE))

@@ -14,6 +14,7 @@ import pytest
 
 from symdyn import systems
 from symdyn.backend.right_side import RightSide
+from symdyn.backend.thresholds import EVENTS, PIVOTS, Macros
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.library import CLibrary
 from symdyn.runtime.inputs.inputs import take_inputs
@@ -115,6 +116,11 @@ def test_ends_of_steps_are_put_onto_constraints_alike(name: str) -> None:
     assert counts["failed"] > 0 or not projector.n_c
 
 
+def defined(macros: Macros) -> str:
+    """Their definitions in C."""
+    return "".join(f"#define {name} {value!r}\n" for name, value in macros)
+
+
 # -- resets
 
 KEEP_RESETS = """
@@ -169,8 +175,8 @@ def test_rows_that_are_open_are_solved_alike(m: int, tmp_path: Path) -> None:
         G = L @ L.T
         gap = G @ stream.normal(size=m) if stream.uniform() < 0.6 else stream.normal(size=m)
         rows.append(np.concatenate([G.ravel(), gap, stream.uniform(size=m) < 0.8]))
-    found, _ = rows_in_c(tmp_path, f"enum {{ M = {m} }};\n{OPEN_ROWS}", "solve(", m * m + 2 * m, 2 * m)(
-        np.array(rows))
+    text = f"{defined(PIVOTS)}enum {{ M = {m} }};\n{OPEN_ROWS}"
+    found, _ = rows_in_c(tmp_path, text, "solve(", m * m + 2 * m, 2 * m)(np.array(rows))
     left_out = 0
     for row, result in zip(rows, found, strict=True):
         G, gap = row[:m * m].reshape(m, m), row[m * m:m * m + m]
@@ -310,7 +316,7 @@ def test_zeros_of_events_are_the_same(tmp_path: Path) -> None:
     """The same bits over ten thousand quantities; before a zero a quantity has its side, at it no more."""
     rows, text = of_zeros(10_000), (RUNTIME / "events.h").read_text(encoding="utf-8")
     (function,) = CUT.findall(text)
-    found, failed = rows_in_c(tmp_path, ZEROS.replace("FUNCTION", function), "zero(", 11, 1)(rows)
+    found, failed = rows_in_c(tmp_path, defined(EVENTS) + ZEROS.replace("FUNCTION", function), "zero(", 11, 1)(rows)
     assert not failed.any() and (rows[:, 7] == 0).sum() > 500 and (rows[:, 8] == 0).sum() > 500
     for row, (root,) in zip(rows, found.tolist(), strict=True):
         a, b, at_a, at_b, side, least = row[5:].tolist()

@@ -66,10 +66,10 @@ static int symdyn_event_sides(symdyn_run *run, double t, const double *x, const 
 static int symdyn_event_root(symdyn_run *run, int k, double a, double b, double at_a, double at_b, double least, double *root) {
     double values[SYMDYN_N_EVENTS], x[SYMDYN_NX];
     int failure, last = 0;
-    for (int round = 0; round < 200; round++) {
-        const double close = 4.0 * symdyn_eps * fmax(fabs(a), fabs(b)), inside = b > a ? close : -close;
+    for (int round = 0; round < SYMDYN_MOST_SECANTS + SYMDYN_MOST_HALVINGS; round++) {
+        const double close = SYMDYN_CLOSE * symdyn_eps * fmax(fabs(a), fabs(b)), inside = b > a ? close : -close;
         if (fabs(b - a) <= close || at_b == 0.0 || (at_a <= 0.0 && fabs(b - a) <= least)) break;
-        double s = at_a > 0.0 && round < 100 ? b - at_b * (b - a) / (at_b - at_a) : 0.5 * (a + b);
+        double s = at_a > 0.0 && round < SYMDYN_MOST_SECANTS ? b - at_b * (b - a) / (at_b - at_a) : 0.5 * (a + b);
         if (!(fabs(s - a) > 0.25 * close && fabs(s - b) > 0.25 * close)) s = fabs(s - a) < fabs(s - b) ? a + inside : b - inside;
         if ((failure = symdyn_state_at(run, s, x)) || (failure = symdyn_event_values(run, s, x, values))) return failure;
         const double value = values[k] * run->events.side[k];
