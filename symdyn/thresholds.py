@@ -9,7 +9,7 @@ from __future__ import annotations
 # part of the entries of the diagonal: rows that depend on each other. RANK in symdyn/tape/intrinsics.py is for J itself.
 DEPENDENT = 1e-10
 
-# Projections. What rounding leaves of positions and speeds, and from which on a projection has failed.
+# Projections. Residuals that rounding leaves of positions and speeds, and from which on a projection has failed.
 LEFT, TOO_MUCH_POSITION, TOO_MUCH_SPEED = 1e-13, 1e-9, 1e-8
 # Coordinates are known to eps |q| only, |q| the largest of them in m (angles times the length): of positions rounding leaves this
 # part of |q| by the length where that is more, and a failure is more than so many times that. Within 100 lengths it is not felt.
@@ -24,7 +24,7 @@ PART_OF_WAY, PART_OF_SIZE = 0.5, 1e-6
 # Changes that count, as a part of the tolerance, and in roundings of the largest entry.
 NOTICED, ROUNDINGS = 1e-3, 16.0
 
-# Resets on constraints. What would take other entries so many times as far is held by the constraints; gaps that are closed.
+# Resets on constraints. Entries that would take others so many times as far are held by the constraints; gaps that are closed.
 HOLDS, CLOSED = 1e6, 1e-15
 # Coordinates that a reset moves by more than this part of their size come onto the constraints on a way of their own. Parts of a
 # derivative that count as none: of coordinates that may be free; of what is held, by that of all coordinates or speeds, and by

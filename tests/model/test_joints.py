@@ -99,7 +99,7 @@ JOINTS: dict[str, tuple[Make, Any, Any]] = {
 
 
 def test_joints_stand_in_the_order_in_which_they_were_added_where_parents_come_first() -> None:
-    """Two links in a row, then one beside the first; with a joint that is added before its parent's the order is by depth."""
+    """Two links in a row, then one next to the first; with a joint that is added before its parent's the order is by depth."""
     for added, wanted in (("ABC", "ABC"), ("BAC", "ACB")):
         s = sd.System("order")
         bodies = {name: s.add_body(name, mass=1, inertia=[1, 1, 1]) for name in "abc"}

@@ -71,7 +71,7 @@ SYMDYN_EXPORT void symdyn_move_ends(symdyn_run *run, long n, const double *t, co
 }
 """
 ENDS = 1700
-# Of these every second sample begins where the gradient of a constraint vanishes.
+# Every second sample of these begins where the gradient of a constraint vanishes.
 FOLDED = {"slider_crank": [np.pi / 2, -np.pi]}
 
 
@@ -270,7 +270,7 @@ CUT = re.compile(r"^static int symdyn_event_root\(.*?^}$", re.MULTILINE | re.DOT
 
 
 def quantity(c: np.ndarray, t: float) -> float:
-    """Of ZEROS: a cubic, a sine, an exponential, a cubic with a double zero."""
+    """Quantities of ZEROS: a cubic, a sine, an exponential, a cubic with a double zero."""
     kind, c1, c2, c3, c4 = c[:5].tolist()
     if kind == 0:
         return ((c1 * t + c2) * t + c3) * t + c4

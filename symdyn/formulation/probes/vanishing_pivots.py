@@ -100,7 +100,7 @@ def nonzero_indices(row: np.ndarray) -> frozenset[int]:
 
 
 class Search:
-    """What `vanishing_pivots` asks, link by link.
+    """Questions of `vanishing_pivots`, link by link.
 
     alive     speeds that a motion without kinetic energy may have, as far as is known; those of beams bend them
     sound     speeds that always move a link otherwise than the speeds after them do: their pivots are not zero
@@ -157,7 +157,7 @@ class Search:
         return bool((squares > ALIKE).all() and (np.ptp(squares, axis=0) < ALIKE * squares[0]).all())
 
     def _squares(self, k: int, p: int, after: Sequence[int]) -> np.ndarray:
-        """What `_Position.squares` gives at all positions, (POSITIONS, 2)."""
+        """Results of `_Position.squares` at all positions, (POSITIONS, 2)."""
         link, first = self.tree.links[k], self.positions[0]
         key: tuple[Any, ...] = (k, p, *after)
         if not first.carried(k):
@@ -279,7 +279,7 @@ class _Position:
 
 
 def _shape(entries: Sequence[Any], named: Set[str]) -> tuple[Any, ...]:
-    """How entries are computed: the same for those that differ in the names of their leaves alone, but for those in `named`."""
+    """Key of how entries are computed: the same for those that differ in the names of their leaves alone, but for those in `named`."""
     found = list(dict.fromkeys(e for e in entries if isinstance(e, Node)))
     numbers = {node: k for k, node in enumerate(found)}
     for node in found:  # which grows meanwhile
