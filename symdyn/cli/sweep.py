@@ -76,8 +76,8 @@ def sweep(arguments: argparse.Namespace) -> int:
         try:
             done.plot(folder / "ensemble.png", asked.values.get("scatter"))
             print(f"wrote {folder / 'ensemble.png'}")
-        except MissingExtra as missing:
-            print(f"no picture: {missing}")
+        except MissingExtra as error:
+            print(f"no picture: {error}")
     return 0
 
 

@@ -152,8 +152,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any], used
     for output in s.outputs:
         if isinstance(output.value, Point):
             note(output.value.at, "m")
-    for _, expressions, _ in used:
-        for quantity in quantities_in(expressions):
+    for _, read, _ in used:
+        for quantity in quantities_in(read):
             for point in quantity.measure.points:
                 note(point, "m")
     return units

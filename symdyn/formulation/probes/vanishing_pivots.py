@@ -279,7 +279,7 @@ class _Position:
 
 
 def _shape(entries: Sequence[Any], named: Set[str]) -> tuple[Any, ...]:
-    """Key of how entries are computed: the same for those that differ in the names of their leaves alone, but for those in `named`."""
+    """Key of how entries are computed: the same for those that differ in names of leaves alone, but for those in `named`."""
     found = list(dict.fromkeys(e for e in entries if isinstance(e, Node)))
     numbers = {node: k for k, node in enumerate(found)}
     for node in found:  # which grows meanwhile

@@ -65,11 +65,14 @@ MOST_NUMBERS = 2**26
 TRIAL_STEPS = 100
 
 
-def simulate(module: Module, t: Any, q: Any, u: Any, params: Any, *, z: Any, inputs: Any, rtol: float, atol: Any, method: Any,
-             steps: bool, max_step: float, first_step: float, max_steps: int | None, progress: bool, work: bool,
-             stabilization: Any, events: Any, event_spacing: float, interpolation: str, extend: str, sensitivities: Any,
-             sensitivity_control: bool, step: float) -> Solution:
-    """See Module.simulate."""
+def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
+             inputs: Any = None, rtol: float = RTOL, atol: Any = None, method: Any = None, steps: bool = False,
+             max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
+             progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
+             event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error", sensitivities: Any = None,
+             sensitivity_control: bool = True, step: float = 0.0, judged: bool = True) -> Solution:
+    """See Module.simulate; judged: whether sensitivities are looked at for what there is to be warned of in them, which takes as
+    long as a short run: fits have that of their first motion."""
     metadata = module.metadata
     p = real_parameters(module, params)
     start = start_of(module, q, u, z)
@@ -149,7 +152,7 @@ def simulate(module: Module, t: Any, q: Any, u: Any, params: Any, *, z: Any, inp
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         free = free.recorded(outcome.record)
         known = replace(request, inputs=free)
-        of_columns = [] if outcome.interrupted else asked.doubts(
+        of_columns = [] if outcome.interrupted or not judged else asked.doubts(
             module, known, outcome, lambda: _steps(module, replace(whole, inputs=free), method, outcome.n_steps))
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen]), *of_columns))
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
