@@ -35,6 +35,11 @@ def skid(friction: object, m1: object = 1, m2: object = 2, pushes: object = 18) 
     return system.compile()
 
 
+def slides(t: float, x: np.ndarray, kinetic: float) -> np.ndarray:
+    """Rates of the place and the speed of the skid."""
+    return np.concatenate([x[2:], (pushed(t) - kinetic * PRESSED * x[2:] / np.linalg.norm(x[2:])) / MASSES])
+
+
 @cache
 def expected(static: float, kinetic: float) -> tuple[float, float, np.ndarray]:
     """When the skid begins to slip and when it sticks again, at the latest at 5 s, and where it is then.
@@ -55,14 +60,11 @@ def expected(static: float, kinetic: float) -> tuple[float, float, np.ndarray]:
         d = force / (MASSES * size + kinetic * PRESSED)
         start = np.concatenate([size * d * after**2 / 2, size * d * after])
 
-    def slides(t: float, x: np.ndarray) -> np.ndarray:
-        return np.concatenate([x[2:], (pushed(t) - kinetic * PRESSED * x[2:] / np.linalg.norm(x[2:])) / MASSES])
-
-    def rests(t: float, x: np.ndarray) -> float:
+    def rests(t: float, x: np.ndarray, kinetic: float) -> float:
         return float(np.linalg.norm(x[2:])) - 1e-9
 
     rests.terminal, rests.direction = True, -1  # type: ignore[attr-defined]
-    found = solve_ivp(slides, (begins + after, 5), start, method="Radau", rtol=1e-11, atol=1e-14, events=rests)
+    found = solve_ivp(slides, (begins + after, 5), start, method="Radau", rtol=1e-11, atol=1e-14, events=rests, args=(kinetic,))
     return begins, float(found.t[-1]), found.y[:2, -1]
 
 
@@ -77,6 +79,16 @@ def test_a_skid_slips_along_the_force_that_held_it_last(kinetic: float, rtol: fl
     assert modes == (("sticking", "sliding", "sticking") if kinetic == 0.4 else ("sticking", "sliding"))
     assert abs(times[1] - begins) < 1e-11 and abs([*times, until][2] - until) < max(20 * rtol, 1e-8)
     np.testing.assert_allclose(solution.q[1, :2], place, rtol=0, atol=max(20 * rtol, 1e-9))
+
+
+def test_a_slip_that_starts_within_the_tolerances_goes_on_where_it_turns() -> None:
+    """A skid that starts along y at 1e-6 m/s, and that is at 2 m/s where it has turned by 45 degrees towards x."""
+    found = solve_ivp(slides, (0, 2), [0, 0, 0, 1e-6], method="Radau", rtol=1e-11, atol=1e-14, args=(0.1,))
+    solution = skid(0.1).simulate([0, 2], u=[0, 1e-6, 0], rtol=1e-6, method="dop853")
+    assert [mode for _, mode in solution.contacts["sole"].switches] == ["sliding"]
+    (turns,) = solution.events["sole_turns"].x[:, 3:5]
+    assert turns[0] == pytest.approx(turns[1]) and 1.5 < np.linalg.norm(turns) < 2.5
+    np.testing.assert_allclose(solution.x[-1, [0, 1, 3, 4]], found.y[:, -1], rtol=0, atol=2e-5)
 
 
 def test_a_disc_that_sticks_and_slips_on_its_edge_is_as_accurate_as_its_tolerance() -> None:
