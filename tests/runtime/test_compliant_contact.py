@@ -232,6 +232,27 @@ def test_all_formulations_and_batches_make_the_same_motion(formulation: str) -> 
     assert reference.work[-1] < 0
 
 
+def test_each_of_several_contacts_has_its_own_gap_and_force() -> None:
+    """A plank at rest on two ends, one of them smooth, that carry it by the lever rule, below a stop that does not touch."""
+    system = sd.System("plank", gravity=[0, -G])
+    body = system.add_body("plank", mass=2.0, inertia=0.1, com=[0.1, 0])
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y angle")))
+    for name, end, friction in (("left", [-0.5, 0], 0), ("stop", [0.2, 0.3], 0.4), ("right", [0.5, 0], 0.4)):
+        system.add_contact(sd.Contact(name, body, system.ground, shape=C.Point(end), friction=friction, law="compliant",
+                                      compliance=C.Compliance(STIFFNESS, exponent=1)))
+    left, right = (2 * G * share for share in (0.4, 0.6))
+    y, angle = -(left + right) / 2 / STIFFNESS, np.arcsin((left - right) / STIFFNESS)
+    contacts = system.compile().simulate((0, 1e-3), q=[0, y, angle]).contacts
+    for name, force, gap in (("left", left, -left / STIFFNESS), ("stop", 0.0, y + 0.2 * np.sin(angle) + 0.3 * np.cos(angle)),
+                             ("right", right, -right / STIFFNESS)):
+        motion = contacts[name]
+        np.testing.assert_allclose(motion.force[:, 0], force, rtol=1e-6)
+        np.testing.assert_allclose(motion.gap, gap, rtol=1e-6)
+        assert motion.force.shape[1] == motion.slip.shape[1] + 1 == (1 if name == "left" else 2)
+        assert np.abs(motion.force[:, 1:]).max(initial=0.0) < 1e-3
+        assert {motion.mode[0], motion.mode[-1]} == {OPEN if name == "stop" else SLIDING if name == "left" else STICKING}
+
+
 def test_steps_end_where_the_gap_closes() -> None:
     """A ball on a linear spring, in closed form: the error is smaller with fewer steps."""
     stiffness, height = 1e6, 1.0
