@@ -209,6 +209,19 @@ def _print_prediction(plan: Plan, measured: Measured, result: Prediction, cluste
     print(f"  disk          {_in_bytes(result.written)} at the most, {_in_bytes(result.result)} at the end; "
           f"{counted(result.files, 'file')} on the way")
     print(f"  memory        {_in_bytes(result.memory)} a worker")
+    if idle := _idle(result):
+        print(f"  idle          {idle}")
+
+
+def _idle(result: Prediction) -> str:
+    """Workers, or cores of them, for which there are no chunks, in words."""
+    seats, there = result.workers * result.cores, counted(result.files, "chunk")
+    if result.files >= seats:
+        return ""
+    left = (f"{result.workers - result.files:,} of {result.workers:,} workers" if result.files < result.workers else
+            f"{seats - result.files:,} of {seats:,} cores")
+    return f"{left}, as there {'is' if result.files == 1 else 'are'} {there}; ask for fewer" + (
+        ", or for a smaller chunk" if result.size > 1 else "")
 
 
 def _print_limits(result: list[Limit], count: int) -> None:

@@ -41,6 +41,10 @@ WHY = {"memory": "Dask's workers have theirs already", "lease": "Dask itself not
        **dict.fromkeys(("partition", "account", "qos", "nodes", "gpus"), "it is of Slurm")}
 # Workers of one line.
 WORKERS = 16
+# Seconds of a lease at the most: the waiting times of some systems are counted in 32 bits.
+LONGEST = 1e7
+# Numbers in the table are below this.
+LARGEST = 1e18
 # Names of partitions and accounts stand in a script of the shell.
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.,@+-]*")
 SIZES = {"MB": 10**6, "GB": 10**9, "TB": 10**12, "MiB": 2**20, "GiB": 2**30, "TiB": 2**40}
@@ -129,10 +133,11 @@ def _values(table: Mapping[str, Any], kind: str | None, faults: list[str]) -> di
     return values
 
 
-WANTED = {"lease": "a number of seconds from 1 on", "price": "a positive number", "memory": 'a size such as "4 GB"',
+WANTED = {"lease": f"a number of seconds from 1 to {LONGEST:.0e}", "price": f"a positive number below {LARGEST:.0e}",
+          "memory": f'a size such as "4 GB", below {LARGEST:.0e} bytes',
           "kind": f"one of {', '.join(KINDS)}", "address": 'an address such as "tcp://host:8786"',
-          "time": 'a time such as "04:00:00" (hours, minutes, seconds) or "2-12:00:00" (with days)',
-          **dict.fromkeys(("workers", "cores", "nodes", "gpus"), "a whole number from 1 on"),
+          "time": 'a time such as "04:00:00" (hours, minutes, seconds) or "2-12:00:00" (with days, 99999 at the most)',
+          **dict.fromkeys(("workers", "cores", "nodes", "gpus"), f"a whole number from 1 on, below {LARGEST:.0e}"),
           **dict.fromkeys(("partition", "account", "qos"), "a name of letters, digits and _ . , @ + -")}
 
 
@@ -140,17 +145,19 @@ def _value(key: str, value: Any) -> Any:
     """The value of a key; None if it is not as it must be."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if key in ("workers", "cores", "nodes", "gpus"):
-        return value if number and isinstance(value, int) and value >= 1 else None
-    if key in ("lease", "price"):
-        return float(value) if number and (1 if key == "lease" else 1e-300) <= value < 1e300 else None
+        return value if number and isinstance(value, int) and 1 <= value < LARGEST else None
+    if key == "lease":
+        return float(value) if number and 1 <= value <= LONGEST else None
+    if key == "price":
+        return float(value) if number and 0 < value < LARGEST else None
     if key == "time":
         return _seconds(value)
     if not isinstance(value, str):
         return None
     if key == "memory":
         match = re.fullmatch(rf"(\d+(?:\.\d+)?) ?({'|'.join(SIZES)})", value)
-        size = round(float(match[1]) * SIZES[match[2]]) if match else 0
-        return size or None
+        size = float(match[1]) * SIZES[match[2]] if match else 0.0
+        return round(size) or None if size < LARGEST else None
     return value if (key in ("kind", "address") and value) or NAME.fullmatch(value) else None
 
 
@@ -158,7 +165,7 @@ def _seconds(value: Any) -> float | None:
     """Seconds of a time limit."""
     if isinstance(value, time_of_day):  # TOML's 04:00:00 without quotes
         value = value.strftime("%H:%M:%S")
-    match = re.fullmatch(r"(?:(\d+)-)?(\d{1,4}):(\d\d):(\d\d)", value) if isinstance(value, str) else None
+    match = re.fullmatch(r"(?:(\d{1,5})-)?(\d{1,4}):(\d\d):(\d\d)", value) if isinstance(value, str) else None
     if match is None:
         return None
     days, hours, minutes, seconds = (int(part or 0) for part in match.groups())

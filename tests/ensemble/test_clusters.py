@@ -98,12 +98,16 @@ def test_lines_about_a_cluster(content, expected):
         "kind": "slurm", "workers": 0, "cores": True, "memory": "4", "time": 3600, "partition": "a; rm -rf /", "nodes": -1,
         "acount": "a", "lease": 0, "price": "x", "account": "a\nb", "qos": "-x"}},
      ["cluster and dask: slurm and Dask are both asked for; keep one of the lines",
-      "cluster.workers: must be a whole number from 1 on, found 0", "cluster.cores: must be a whole number from 1 on, found True",
-      "cluster.memory: must be a size such as \"4 GB\", found '4'",
-      "cluster.time: must be a time such as \"04:00:00\" (hours, minutes, seconds) or \"2-12:00:00\" (with days), found 3600",
+      "cluster.workers: must be a whole number from 1 on, below 1e+18, found 0",
+      "cluster.cores: must be a whole number from 1 on, below 1e+18, found True",
+      "cluster.memory: must be a size such as \"4 GB\", below 1e+18 bytes, found '4'",
+      "cluster.time: must be a time such as \"04:00:00\" (hours, minutes, seconds) or \"2-12:00:00\" (with days, 99999 at the "
+      "most), found 3600",
       "cluster.partition: must be a name of letters, digits and _ . , @ + -, found 'a; rm -rf /'",
-      "cluster.nodes: must be a whole number from 1 on, found -1", "cluster.acount: not known, did you mean account?",
-      "cluster.lease: must be a number of seconds from 1 on, found 0", "cluster.price: must be a positive number, found 'x'",
+      "cluster.nodes: must be a whole number from 1 on, below 1e+18, found -1",
+      "cluster.acount: not known, did you mean account?",
+      "cluster.lease: must be a number of seconds from 1 to 1e+07, found 0",
+      "cluster.price: must be a positive number below 1e+18, found 'x'",
       "cluster.account: must be a name of letters, digits and _ . , @ + -, found 'a\\nb'",
       "cluster.qos: must be a name of letters, digits and _ . , @ + -, found '-x'",
       "cluster.nodes and cluster.workers: nodes asks for whole nodes, with one worker on each that uses all of its cores; "
@@ -115,13 +119,41 @@ def test_lines_that_contradict_themselves(content, messages):
     assert read(**content) == (None, messages)
 
 
+def test_numbers_that_are_too_large_are_rejected_with_their_bound():
+    many = "9" * 400
+    _, faults = read(cluster={"kind": "slurm", "workers": int(many), "memory": f"{many} GB", "lease": 1e308, "price": 1e18,
+                              "time": f"{many}-00:00:00"})
+    for what, bound in (("workers", "a whole number from 1 on, below 1e+18, found a whole number of about 401 digits"),
+                        ("lease", "a number of seconds from 1 to 1e+07, found 1e+308"),
+                        ("memory", "a size such as \"4 GB\", below 1e+18 bytes, found '99"),
+                        ("price", "a positive number below 1e+18, found 1e+18"),
+                        ("time", "(with days, 99999 at the most), found '99")):
+        assert any(fault.startswith(f"cluster.{what}: must be ") and bound in fault for fault in faults), faults
+    assert len(faults) == 5
+    largest = {"kind": "slurm", "workers": 10**18 - 1, "lease": 1e7, "time": "99999-23:59:59", "memory": "999000 TB"}
+    assert read(cluster=largest)[1] == []
+
+
+@pytest.mark.parametrize("workers, cores, chunk, said", [
+    (5000, 1, 1, "  idle          4,980 of 5,000 workers, as there are 20 chunks; ask for fewer\n"),
+    (2, 3, 20, "  idle          1 of 2 workers, as there is 1 chunk; ask for fewer, or for a smaller chunk\n"),
+    (2, 3, 5, "  idle          2 of 6 cores, as there are 4 chunks; ask for fewer, or for a smaller chunk\n"),
+    (2, 3, 3, None)])
+def test_workers_that_get_no_chunk_are_counted(tmp_path, capsys, workers, cores, chunk, said):
+    path = write(tmp_path, table=f"[cluster]\nkind = \"folder\"\nworkers = {workers}\ncores = {cores}\n", count=20, chunk=chunk)
+    assert main(["sweep", path, "--dry-run", "--output", str(tmp_path / "out")]) == 0
+    found = capsys.readouterr().out
+    assert said in found if said else "idle" not in found, found
+
+
 def test_faults_of_the_cluster_are_among_the_others(tmp_path, capsys):
     path = write(tmp_path, "tt = 1\ndask = \"tcp://a:1\"\nformats = [\"hdf5\"]",
                  "[cluster]\nkind = \"slurm\"\nworkers = 0\ntime = 04:00:00\n")
     assert main(["sweep", path]) == 2
     said = capsys.readouterr().err
     for fault in ("has 4 faults", "tt: not known", "formats: must be of parquet, zarr, found ['hdf5']; ensemble.npz is written",
-                  "cluster and dask: slurm and Dask are both", "cluster.workers: must be a whole number from 1 on, found 0"):
+                  "cluster and dask: slurm and Dask are both",
+                  "cluster.workers: must be a whole number from 1 on, below 1e+18, found 0"):
         assert fault in said, said
 
 
