@@ -85,6 +85,19 @@ def test_every_package_has_one_row() -> None:
     assert set(layers()) == here - {"__init__", "__main__", "templates"}
 
 
+def test_every_folder_and_module_is_explained() -> None:
+    """The tables under Folders name every folder of the package, by its path, and every module outside of folders."""
+    rows = re.findall(r"^\| [^|]+ \| .+ \|$", _section("Folders"), re.MULTILINE)
+    named = {name for row in rows for name in re.findall(r"`([\w/.]+)`", row)}
+    modules = {path.name for path in PACKAGE.glob("*.py")} - {"__init__.py", "__main__.py"}
+    folders = {f"{path.relative_to(PACKAGE).as_posix()}/" for path in PACKAGE.rglob("*") if path.is_dir()
+               and path.name != "templates" and any(one.is_file() and one.suffix != ".pyc" for one in path.iterdir())}
+    assert {"cli/", "backend/methods/"} <= folders and {"facade.py", "shown.py"} <= modules
+    assert (folders | modules) - named == set()
+    first = {name for row in rows for name in re.findall(r"`(\w+\.py)`", row.split(" | ")[0])}
+    assert first == modules
+
+
 def test_imports_go_down_the_table() -> None:
     """At the top of a file only what stands in an earlier row; inside functions of the listed files also what comes later."""
     rows, allowed = layers(), upward()
