@@ -40,3 +40,12 @@ CLOSE, MOST_SECANTS, MOST_HALVINGS = 4.0, 100, 100
 
 # Flights of rigid contacts shorter than so many roundings of the time are not followed.
 FLIGHT = 1e4
+
+# No step begins while so many events wait; each step may add some, see `most_events`.
+WAITING = 64
+
+
+def most_events(n: int) -> int:
+    """Number of events of n kinds that may wait: at the next time after WAITING - 1 all kinds may happen, and once in a run
+    each kind is noted as not resolved and as not proved, and one as depending on the order."""
+    return WAITING + 3 * n

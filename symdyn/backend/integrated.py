@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from symdyn import thresholds as limits
 from symdyn.backend import thresholds
 from symdyn.backend.band import Band
 from symdyn.backend.gathered import Gathered
@@ -22,8 +23,6 @@ OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
 OF_CARRYING = ("carried_columns",)
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
-# No step begins while so many wait; each step may add some, see `most_events`.
-WAITING = 64
 
 
 @dataclass(frozen=True)
@@ -85,19 +84,13 @@ class Shape:
     @property
     def most_events(self) -> int:
         """Number of events that may wait until they are taken."""
-        return most_events(len(self.events))
+        return limits.most_events(len(self.events))
 
     @property
     def held(self) -> list[int]:
         """The entries of [q; u] that events reset and that stay when constraints are met, in order."""
         middle = self.sizes["q"] + self.sizes["u"]
         return sorted({index for index in self.resets if index < middle}) if self.n_rows and self.directed else []
-
-
-def most_events(n: int) -> int:
-    """Number of events of n kinds that may wait: at the next time after WAITING - 1 all kinds may happen, and once in a run
-    each kind is noted as not resolved and as not proved, and one as depending on the order."""
-    return WAITING + 3 * n
 
 
 def functions(needs: Sequence[str], arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,
@@ -144,7 +137,8 @@ def sizes(method: Method, shape: Shape, gathered: Gathered) -> list[tuple[str, f
     if shape.unit_groups:
         result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
     if shape.events:
-        result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_WAITING", WAITING), ("SYMDYN_NOTES", shape.most_events)]
+        result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_WAITING", limits.WAITING),
+                   ("SYMDYN_NOTES", shape.most_events)]
     for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
         if entries:
             result.append((name, len(entries)))

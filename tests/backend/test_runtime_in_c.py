@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from symdyn.backend import integrated
+from symdyn import thresholds
 from symdyn.backend.band import Band
 from symdyn.backend.context import Corrections, Integrator, Manifold
 from symdyn.backend.gathered import Gathered
@@ -100,7 +100,7 @@ class Run:
 
     def events(self, n_events: int) -> np.ndarray:
         """Rows of which, time, state before, state after."""
-        noted = np.zeros(integrated.most_events(n_events), dtype=np.dtype(Noted))
+        noted = np.zeros(thresholds.most_events(n_events), dtype=np.dtype(Noted))
         states = np.zeros((len(noted), 2 * self.n))
         self.library.symdyn_simulation_events.restype = ctypes.c_long
         n = self.library.symdyn_simulation_events(self.address, pointer(noted), pointer(states))
@@ -428,7 +428,7 @@ def test_zeros_of_a_cubic_and_a_reset(build: Build, tmp_path: Path) -> None:
 
 def test_events_wait_until_they_are_taken(build: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With room for few of them the integrator stops again and again, and no zero of a sine is lost."""
-    monkeypatch.setattr(integrated, "WAITING", 2)
+    monkeypatch.setattr(thresholds, "WAITING", 2)
     shape = Shape({"q": 1, "u": 0, "z": 0, "inputs": 0}, 0, (), [EventRecord("a", 0, False, (), False, (), ())])
     text = integrator("dop853", shape, {"field": "out[0] = 1.0;", "events_at": "out[0] = sin(10.0*x[0]);"}, tmp_path)
     run = Run(build(text), [0.1], (0.1, 10.0), 1e-9, look=1)
@@ -436,7 +436,7 @@ def test_events_wait_until_they_are_taken(build: Build, tmp_path: Path, monkeypa
     while status == STATUS.STORE_FULL:
         status = run.go(np.array([10.0]))[0]
         taken.append(run.events(1))
-    assert status == STATUS.DONE and max(map(len, taken)) <= integrated.most_events(1) == 5 and len(taken) > 10
+    assert status == STATUS.DONE and max(map(len, taken)) <= thresholds.most_events(1) == 5 and len(taken) > 10
     np.testing.assert_allclose(np.concatenate(taken)[:, 1], np.arange(1, 32) * np.pi / 10, rtol=0, atol=1e-12)
     with pytest.raises(AssertionError, match="noted has no room"):
         build(text.replace("#define SYMDYN_NOTES 5", "#define SYMDYN_NOTES 4"))

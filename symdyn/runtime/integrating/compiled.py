@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.backend.c_records import fields_of
-from symdyn.backend.integrated import most_events
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.inputs.inputs import not_finite
@@ -27,7 +26,7 @@ from symdyn.runtime.integrating.short_steps import ShortSteps
 from symdyn.runtime.integrating.stabilization import TOO_FAR, Corrections, not_converged, not_smooth, reset_rejected
 from symdyn.runtime.integrating.stops import describe_stop, lost_rank, nearly_singular, with_last
 from symdyn.runtime.raised import InputRaised
-from symdyn.thresholds import AT_ONCE, NEAR
+from symdyn.thresholds import AT_ONCE, NEAR, most_events
 
 if TYPE_CHECKING:
     from symdyn.runtime.building.library import CLibrary

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.c_records import codes_of, fields_of
-from symdyn.backend.integrated import most_events
 from symdyn.backend.right_side import RightSide
 from symdyn.contact_kinds import CLUTCH
 from symdyn.runtime import contact_laws as laws
@@ -29,7 +28,7 @@ from symdyn.runtime.integrating.moreau_memory import Memory
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.run_record import Noted
 from symdyn.runtime.integrating.stabilization import Corrections
-from symdyn.thresholds import DEPENDENT
+from symdyn.thresholds import DEPENDENT, most_events
 
 if TYPE_CHECKING:
     from symdyn.backend.metadata import ContactRecord
