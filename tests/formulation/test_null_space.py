@@ -12,6 +12,7 @@ from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.constraints.consistent_states import ConstraintStates
 from symdyn.formulation.constraints.null_space import NullSpaceSolver, elimination_order
 from symdyn.formulation.constraints.saddle import IntrinsicSolver, RangeSolver, fewest_neighbours, narrow_order
+from symdyn.formulation.constraints.sampled import Sampled
 from symdyn.formulation.probes.dependent_rows import ranks, scaled
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import vector
@@ -54,7 +55,7 @@ def test_statements_solve_the_saddle_point_system(n: int, m: int, singular: bool
     algebra = TapeAlgebra(recorder, {})
     Ms, Cs, fs, ds = (leaves(recorder, name, a, numbers) for name, a in (("M", M), ("C", C), ("f", f), ("d", d)))
     names, speeds = [f"row{k}" for k in range(m)], [f"u{k}" for k in range(n)]
-    order = elimination_order(C, C != 0)
+    order = elimination_order(Sampled.of(C[None]))
     assert order is not None
     solvers = [NullSpaceSolver(algebra, Ms, Cs, order, names, speeds)]
     if not singular:
@@ -69,7 +70,7 @@ def test_right_sides_that_are_zero_cost_nothing() -> None:
     M, C, f, d = problem(4, 2, 3)
     recorder, numbers = Recorder(), {}
     Ms, Cs, fs = (leaves(recorder, name, a, numbers) for name, a in (("M", M), ("C", C), ("f", f)))
-    order = elimination_order(C, C != 0)
+    order = elimination_order(Sampled.of(C[None]))
     solver = NullSpaceSolver(TapeAlgebra(recorder, {}), Ms, Cs, order or [], ["a", "b"], list("wxyz"))
     with_d = Tape.of(recorder, x=solver.solve(fs, leaves(recorder, "d", d, numbers))[0]).operations
     without = Tape.of(recorder, x=solver.solve(fs, np.zeros(2, dtype=object))[0]).operations
@@ -78,8 +79,8 @@ def test_right_sides_that_are_zero_cost_nothing() -> None:
 
 def test_no_pivots_where_a_row_is_zero_or_depends() -> None:
     C = np.array([[1.0, 2.0, 0.0], [2.0, 4.0, 0.0]])
-    assert elimination_order(C, C != 0) is None
-    assert elimination_order(np.zeros((1, 3)), np.ones((1, 3), dtype=bool)) is None
+    assert elimination_order(Sampled.of(C[None])) is None
+    assert elimination_order(Sampled(1, 3, np.zeros(3, dtype=int), np.arange(3), np.zeros((1, 3)))) is None
 
 
 def test_elimination_fills_in_little() -> None:
@@ -88,7 +89,7 @@ def test_elimination_fills_in_little() -> None:
     C = np.zeros((m, m + 1))
     for k in range(m):
         C[k, k:k + 2] = 1, 0.9
-    order = elimination_order(C, C != 0)
+    order = elimination_order(Sampled.of(C[None]))
     assert order is not None
     recorder, numbers = Recorder(), {}
     solver = NullSpaceSolver(TapeAlgebra(recorder, {}), leaves(recorder, "M", np.eye(m + 1), numbers),
