@@ -184,6 +184,23 @@ def test_friction_falls_with_the_slip_by_stribeck_and_grows_by_viscous_friction(
     assert np.allclose(forces, -STIFFNESS * 1e-4 * (MU + 0.1 * np.exp(-((slip / 0.1) ** 2)) + 0.02 * slip), rtol=1e-9)
 
 
+def test_each_of_several_contacts_has_its_own_numbers() -> None:
+    """Points of a plate that slides to the right, at depths of their own, with and without friction."""
+    system = sd.System("plate", gravity=[0, -G])
+    body = system.add_body("plate", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y angle")))
+    points = {"rough": (-0.5, 1e5, 0.4), "smooth": (0.1, 2e5, 0.0), "dull": (0.5, 3e5, 0.2)}
+    for name, (place, stiffness, friction) in points.items():
+        system.add_contact(sd.Contact(name, body, system.ground, shape=C.Point([place, 0]), friction=friction, law="compliant",
+                                      compliance=C.Compliance(stiffness, exponent=1, slip_speed=1e-6)))
+    solution = system.compile(backend="numpy").simulate([0.0, 1e-4], q=[0, -1e-3, 1e-4], u=[0.5, 0, 0])
+    for name, (place, stiffness, friction) in points.items():
+        contact, gap = solution.contacts[name], -1e-3 + place * np.sin(1e-4)
+        assert contact.gap[0] == pytest.approx(gap, rel=1e-9)
+        assert contact.force[0] == pytest.approx([-stiffness * gap, stiffness * gap * friction], rel=1e-9)
+        assert contact.slip[0] == pytest.approx([0.5]) and contact.mode[0] == "sliding"
+
+
 @pytest.mark.parametrize("bristles", [None, C.Bristles(1e5, 300.0), C.Bristles(1e5, 300.0, None)])
 @pytest.mark.parametrize("space", [False, True])
 def test_jacobians_are_exact(bristles: Any, space: bool) -> None:
