@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import functools
 from typing import Any
@@ -12,10 +13,12 @@ import pytest
 import symdyn as sd
 from symdyn.errors import SimulationInterrupted
 from symdyn.runtime import contact_laws as laws
+from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
-from symdyn.runtime.building.shared import shared
+from symdyn.runtime.building.shared import shared, text
 from symdyn.runtime.contact_laws import Site
 from symdyn.runtime.integrating import contacts, hybrid, mode_codes
+from symdyn.runtime.integrating.slip_begins import SlipBegins
 from symdyn.thresholds import DEPENDENT
 from tests.derivatives.test_periodic_contacts import after_heel_strike, walker
 from tests.helpers import swept
@@ -41,7 +44,7 @@ def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str
     return found, [mode_codes.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
 
 
-@pytest.mark.parametrize(("n", "problems"), [(1, 6000), (2, 500), *swept([(3, 300)])])
+@pytest.mark.parametrize(("n", "problems"), [(1, 9200), (2, 800), *swept([(3, 300)])])
 def test_modes_are_those_of_all_combinations(n: int, problems: int) -> None:
     """Random problems with and without friction, with friction of joints, slips and modes that are ruled out; of some the rows
     depend on each other, or nothing moves."""
@@ -202,6 +205,101 @@ def test_motions_are_those_with_every_switch_in_python(name: str, method: str, m
         assert len(one.t) == len(slow.events[event].t)
     assert len(quick.doubts) == len(slow.doubts)
     assert np.abs(quick.energy_balance["error"]).max() < 1e-6
+
+SWITCH = """
+SYMDYN_EXPORT int symdyn_hybrid_one(symdyn_hybrid *h);
+SYMDYN_EXPORT int symdyn_hybrid_one(symdyn_hybrid *h) { return symdyn_take_parameters(h) || symdyn_switch(h); }
+"""
+SWITCHES = 1250
+
+
+class Switches:
+    """Switches of a motion, and the like of other states, before any is made."""
+
+    def __init__(self, module: Any, span: tuple[float, float], start: dict[str, Any], seed: int) -> None:
+        self.seen: list[Any] = []
+        self.stream, switch = np.random.default_rng(seed), contacts._Phases._switch
+
+        def noted(one: Any, t: float, x: np.ndarray, fired: Any, begins: bool) -> np.ndarray:
+            kept = copy.copy(one)
+            kept.t, kept.x, kept.fired, kept.begun, kept.left = t, x.copy(), list(fired), begins, dict(one.left)
+            kept.modes, kept.still, kept.passed = one.modes.copy(), one.still.copy(), one.passed.copy()
+            kept.directions = one.directions.copy()
+            if one._is_plain() and not one.left:
+                self.seen.append(kept)
+            return switch(one, t, x, fired, begins)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(contacts._Phases, "_switch", noted)
+            patch.setattr(hybrid, "of", lambda *given: None)
+            module.simulate(span, **start)
+        motion = hybrid.of(module, self.seen[0].request, "dop853")
+        assert motion is not None
+        self.motion, self.library = motion, cache.load(text("hybrid") + SWITCH, "symdyn_hybrid", require_compiler())
+
+    def draw(self) -> Any:
+        """One of them, of another state with the same contacts closed, sticking and meeting, whose forces have left their bounds
+        where that has fired."""
+        while True:
+            one = self._near()
+            values = one._values("events", one.t, one.x, one._parameters())
+            if all(values[one.events[k][what]] <= 0 for k, what in one.fired if what in ("opens", "slips")):
+                return one
+
+    def _near(self) -> Any:
+        seen, stream = self.seen[self.stream.integers(len(self.seen))], self.stream
+        one, middle = copy.copy(seen), seen.module.metadata.sizes.q + seen.module.metadata.sizes.u
+        one.impacts, one.happened, one.doubts, one.ruled_out, one.left = [], [], {}, {}, {}
+        one.modes, one.still, one.passed = seen.modes.copy(), seen.still.copy(), seen.passed.copy()
+        one.evaluators, one.latest_numbers, one.begins = {}, None, SlipBegins(2.0)
+        x = seen.x.copy()
+        x[:middle] += 10.0 ** stream.uniform(-6, -0.5) * stream.normal(size=middle)
+        closing = {k for k, what in one.fired if what == "closes"}
+        gaps = {k: one.normal[k] for k in one.placed if one.modes[k] != contacts.OPEN or k in closing}
+        held = [one.normal[k] for k, mode in enumerate(one.modes) if mode != contacts.OPEN and one.records[k].normal]
+        held += [row for k, still in enumerate(one.still) if still and one.modes[k] != contacts.OPEN for row in one.tangents[k]]
+        for _ in range(3):
+            x = contacts.onto_rows(lambda x: one._numbers(one.t, x), x, gaps, held)
+        slip, directions = one._numbers(one.t, x).slip, []
+        for k, (mode, rows) in enumerate(zip(one.modes, one.tangents, strict=True)):
+            directions.append(np.sign(slip[rows]) if mode == contacts.SLIDING and not one.still[k] else one.directions[k])
+        one.x, one.directions = x, directions
+        return one
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_switches_are_those_of_python(name: str) -> None:
+    """States near the switches of a motion: what C makes, with impacts, modes and slips that begin, is what Python makes."""
+    make, span, start, _ = CASES[name]
+    switches, done = Switches(make(), span, start, 5), 0
+    motion = switches.motion
+    for _ in range(4 * SWITCHES):
+        if done == SWITCHES:
+            break
+        one = switches.draw()
+        motion.start(one.request, contacts.LAWS, one.same)
+        motion.record.n_phases = motion.record.n_impacts = 0
+        one._hand_over(motion)
+        if switches.library.symdyn_hybrid_one(ctypes.byref(motion.record)):
+            continue
+        done += 1
+        x = one._switch(one.t, one.x, one.fired, one.begun)
+        assert not one.doubts and not one.shared
+        assert [hybrid.MODES[k] for k in motion.mode.tolist()] == one.modes
+        assert np.abs(motion.x - x).max() <= 1e-9 * (1 + np.abs(x).max())
+        assert motion.passed.tolist() == one.passed
+        closed = [k for k, mode in enumerate(one.modes) if mode != contacts.OPEN]
+        assert [bool(motion.still[k]) for k in closed] == [one.still[k] for k in closed]
+        rubbing = [k for k in closed if one.tangents[k]]
+        assert motion.sign[rubbing].tolist() == [one.directions[k][0] for k in rubbing]
+        assert np.flatnonzero(motion.slipping).tolist() == sorted(one.begins.directions)
+        assert np.flatnonzero(motion.left > -np.inf).tolist() == sorted(one.left)
+        assert motion.record.n_impacts == len(one.impacts)
+        assert motion.happened[:motion.record.n_happened].tolist() == [each.event for each in one.happened]
+        for impact, theirs in zip(one.impacts, motion.impact, strict=False):
+            ours = np.array([impact.impulses, impact.before, impact.after])
+            assert np.abs(ours - theirs).max() <= 1e-9 * (1 + np.abs(ours).max())
+    assert done == SWITCHES
 
 
 def test_a_motion_in_pieces_is_the_same_and_keeps_what_was_done_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
