@@ -285,7 +285,7 @@ def test_switches_are_those_of_python(name: str) -> None:
         done += 1
         x = one._switch(one.t, one.x, one.fired, one.begun)
         assert not one.doubts and not one.shared
-        assert [hybrid.MODES[k] for k in motion.mode.tolist()] == one.modes
+        assert [mode_codes.MODES[k] for k in motion.mode.tolist()] == one.modes
         assert np.abs(motion.x - x).max() <= 1e-9 * (1 + np.abs(x).max())
         assert motion.passed.tolist() == one.passed
         closed = [k for k, mode in enumerate(one.modes) if mode != contacts.OPEN]
