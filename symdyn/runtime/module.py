@@ -29,6 +29,8 @@ from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    import sympy as sp
+
     from symdyn.backend.packed import Pattern
     from symdyn.given import ContactMode, Key, Named, Names, Numbers, PathName, Row, States, Times, Values
     from symdyn.report.text import Report
@@ -51,9 +53,9 @@ if TYPE_CHECKING:
     from symdyn.statics.stability import Stability
     from symdyn.tape.tape import Tape
 
-    # A number; a table over time, as a pair of times and values or as Table; a function of (t, x); a controller whose values are
-    # held.
-    InputValue: TypeAlias = float | Table | tuple[Row, Row] | Callable[[float, np.ndarray], float] | Sampled
+    # A number; a table over time, as a pair of times and values or as Table; a function of (t, x); an expression of the time; a
+    # controller whose values are held.
+    InputValue: TypeAlias = float | Table | tuple[Row, Row] | Callable[[float, np.ndarray], float] | sp.Expr | Sampled
     # Values of all inputs in one of these ways, or one for each by name.
     InputValues: TypeAlias = (Row | Table | tuple[Row, Row | Sequence[Row]] | Callable[[float, np.ndarray], float | Row] | Sampled
                               | Named[InputValue] | Numbers)
@@ -732,10 +734,10 @@ class Module:
         q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
         params      as everywhere in Module
         inputs      numbers; a table: (times, values), or a symdyn.Table; a spline of SciPy, of order three at most; a function of
-                    (t, x); sd.Sampled(function, period) for a controller whose value is held between its instants, at which steps
-                    end; or a mapping from names to these.
-                    A motion (sd.motions): a function of t that returns value, rate and acceleration, a spline of SciPy, a
-                    table, or a number
+                    (t, x); an expression of symdyn.t; sd.Sampled(function, period) for a controller whose value is held between
+                    its instants, at which steps end; or a mapping from names to these.
+                    A motion (sd.motions): a function of t that returns value, rate and acceleration, an expression of symdyn.t, a
+                    spline of SciPy, a table, or a number
         interpolation, extend   of tables that are pairs: "linear" or "cubic", a smooth spline (steps end at the times of both);
                     beyond the first and the last time "error", or "hold": the first value, and the last one
         rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol

@@ -15,6 +15,7 @@ from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, number, real
 from symdyn.runtime.contradicted import contradiction, message
 from symdyn.runtime.inputs.following import RATES, Followed, Motions, spline_pieces, take_motion
+from symdyn.runtime.inputs.of_time import input_of, is_expression, is_smooth, motion_of
 from symdyn.runtime.inputs.sampled import Record, Sampled, Sampler
 from symdyn.runtime.inputs.tables import Pieces, Piecewise, Table, joined
 from symdyn.runtime.raised import InputRaised, called
@@ -258,9 +259,9 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     """Inputs as the user gave them.
 
     given   None (defaults, else zero); numbers in order; a function of (t, x) or a Sampled controller for all; a pair (times,
-            values) or a Table; or a mapping from names or symbols to a number, a function of (t, x), a pair (times, values), a
-            Table, a spline of SciPy, or a Sampled controller, which may also have several names as its key; a spline alone is
-            that of the only input
+            values) or a Table; or a mapping from names or symbols to a number, a function of (t, x), an expression of the time,
+            a pair (times, values), a Table, a spline of SciPy, or a Sampled controller, which may also have several names as its
+            key; a spline or an expression alone is that of the only input
     span    of the run, which tables must cover unless their ends are held; None: not asked
     interpolation, extend   of pairs, as of a Table
     motions   names of those that are motions: also functions of t that return value, rate and acceleration, splines of SciPy and
@@ -278,7 +279,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(start)
     if not names:
         raise ArgumentError(f"{owner}: inputs were given, but the system has none")
-    if len(names) == 1 and not motions and type(given).__module__.startswith("scipy.interpolate"):
+    if len(names) == 1 and not motions and (type(given).__module__.startswith("scipy.interpolate") or is_expression(given)):
         given = {names[0]: given}
     if motions and (isinstance(given, Sampled) or callable(given) or is_table(given)):
         raise ArgumentError(f"{owner}: the inputs {', '.join(motions)} are motions, which need rates and accelerations; give "
@@ -299,6 +300,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     samplers, given = _samplers(given, names, owner)
     sampled = {names[index]: start[index] for sampler in samplers for index in sampler.indices}
     parts = {name_of(key): value for key, value in given.items()}
+    parts |= {n: _by_time(v, f"{owner}: inputs: {n}", n in motions) for n, v in parts.items() if is_expression(v)}
     for n, value in parts.items():
         pieces = None if n in motions else spline_pieces(value, f"{owner}: inputs: {n}", span)
         parts[n] = value if pieces is None else Piecewise(pieces)
@@ -395,9 +397,15 @@ def is_table(value: Any) -> bool:
 
 
 def varies_over_time(given: Any) -> bool:
-    """Whether inputs as the user gave them, or any of them, are functions, tables or sampled controllers."""
+    """Whether inputs as the user gave them, or any of them, are functions, expressions, tables or sampled controllers."""
     each = given.values() if isinstance(given, Mapping) else (given,)
-    return any(callable(value) or isinstance(value, Sampled) or is_table(value) for value in each)
+    return any(callable(value) or isinstance(value, Sampled) or is_table(value) or is_expression(value) for value in each)
+
+
+def _by_time(expression: Any, where: str, motion: bool) -> Any:
+    """The function of an expression of the time, declared smooth where it is."""
+    function: Any = motion_of(expression, where) if motion else input_of(expression, where)
+    return Smooth(function) if is_smooth(expression) else function
 
 
 def _asked(function: Callable[[float, np.ndarray], Any], what: str, t: float, x: np.ndarray) -> Any:
