@@ -133,7 +133,7 @@ SYMDYN_EXPORT void symdyn_keep_all(symdyn_run *run, long n, const double *old, d
     }
 }
 """
-RESETS = 500
+RESETS = 1700
 OPEN_ROWS = """
 #include "pivots.h"
 static int solve(const double *in, double *out) {
