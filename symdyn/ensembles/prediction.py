@@ -36,8 +36,8 @@ PATIENCE = 60.0
 LEAST = 0.3
 # Motions that are computed at once in a measurement, at most.
 AT_ONCE = 4000
-# Chunks, and bytes of each, of the scratch results that are put together.
-TRIAL_CHUNKS, TRIAL_BYTES = 4, 2**23
+# Chunks of scratch results that are put together, and bytes of the large ones.
+FEW, MANY, TRIAL_BYTES = 2, 66, 2**25
 # Files in a folder from which on listing it takes seconds on a cluster's file system.
 COMFORTABLE = 100_000
 # Probability within which the mean of all motions is, by Student's distribution of the ten.
@@ -51,7 +51,8 @@ class Measured:
     alone       seconds of each motion by itself, on a core
     motion      seconds of one core, or of a GPU, for a motion as the run computes it; NaN: on a GPU that this machine lacks
     serial      the part of the work in which threads of a worker wait for each other
-    put, merge  seconds for a chunk and for a byte of it: to write it; to put it together with others, and to export it
+    put         seconds for a chunk, and for a byte of it, to write it
+    merge       seconds once, for a chunk, and for a byte of the results, to put them together and to export them
     exported    bytes of other formats for a byte of ensemble.npz
     start       seconds until a worker computes its first motion;  memory: bytes that it has taken until then
     failed      part of the samples that failed
@@ -61,7 +62,7 @@ class Measured:
     motion: float
     serial: float
     put: tuple[float, float]
-    merge: tuple[float, float]
+    merge: tuple[float, float, float]
     exported: float
     start: float
     memory: int
@@ -158,7 +159,7 @@ def predict(plan: Plan, measured: Measured, count: int, workers: int, cores: int
     work = (chunk if n_chunks > 1 else last * motion) * rounds
     wall = measured.start + max(work + put, n_chunks * put / workers)
     result = count * plan.row
-    merge = n_chunks * measured.merge[0] + result * measured.merge[1]
+    merge = measured.merge[0] + n_chunks * measured.merge[1] + result * measured.merge[2]
     kept = round(result * (1 + measured.exported))
     spread = float(np.std(alone, ddof=1) / np.mean(alone)) if len(alone) > 1 else 0.0
     error = spread * _student(len(alone)) / math.sqrt(len(alone)) if len(alone) > 1 else math.inf
@@ -315,12 +316,16 @@ def _serial(plan: Plan, rows: np.ndarray, motion: float, cores: int) -> float:
     return float(np.clip((several / single - 1) / (here - 1), 0.0, 1.0))
 
 
-def _disk(plan: Plan, folder: Path, formats: tuple[str, ...]) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Seconds for a chunk and for a byte of it to write it, and to put it together and export it; bytes of exports for one of
-    the result: of numbers without any pattern, which no format makes smaller."""
+def _disk(plan: Plan, folder: Path,
+          formats: tuple[str, ...]) -> tuple[tuple[float, float], tuple[float, float, float], float]:
+    """Seconds for a chunk and for a byte of it to write it; for all results, for a chunk and for a byte to put them together and
+    export them; bytes of exports for one of the result: of numbers without any pattern, which no format makes smaller.
+
+    The first results are the smallest, in which what a process does once, such as loading the packages of formats, is all that
+    takes time. Later ones differ in the number of chunks alone, or in their bytes alone.
+    """
     row = max(1, plan.row)
-    rows = [1, max(2, TRIAL_BYTES // row)]
-    seconds, exported = [], 0.0
+    rows = max(2, TRIAL_BYTES // (FEW * row))
     random = np.random.default_rng(0)
 
     def block(first: int, stop: int) -> np.ndarray:
@@ -328,23 +333,35 @@ def _disk(plan: Plan, folder: Path, formats: tuple[str, ...]) -> tuple[tuple[flo
         return np.resize(drawn, (stop - first, len(plan.samples.names)))
 
     with tempfile.TemporaryDirectory(prefix=".symdyn-dry-run-", dir=_there(folder)) as name:
-        for n in rows:
-            store = Store(Path(name) / str(n), TRIAL_CHUNKS * n, n, plan.columns)
+        def trial(n_chunks: int, n: int, times: int = 2) -> tuple[float, float, float]:
+            """Seconds: a chunk of n rows, putting so many of them together, exporting the result; the least of some times."""
+            nonlocal store
+            store = Store(Path(name) / f"{n_chunks}-{n}", n_chunks * n, n, plan.columns)
             store.begin()
             columns = {label: random.random((n, *shape)) for label, shape in plan.columns.items()}
-            begun = clock.perf_counter()
-            for k in range(TRIAL_CHUNKS):
-                store.put(Done(k, columns))
-            put = clock.perf_counter()
-            store.finish({**plan.about(), "count": store.count}, plan.setting.times, block)
-            for label in formats:
-                EXPORTS[label].write(Ensemble(store.folder), store.folder / EXPORTS[label].file)
-            seconds.append(((put - begun) / TRIAL_CHUNKS, (clock.perf_counter() - put) / TRIAL_CHUNKS))
+            about = {**plan.about(), "count": store.count}
+            put = _taken(lambda: [store.put(Done(k, columns)) for k in range(n_chunks)])
+            together = min(_taken(lambda: store.finish(about, plan.setting.times, block)) for _ in range(times))
+            export = min(_taken(lambda: [EXPORTS[label].write(Ensemble(store.folder), store.folder / EXPORTS[label].file)
+                                         for label in formats]) for _ in range(times))
+            return put / n_chunks, together, export
+
+        store: Store
+        first = trial(FEW, 1, 1)
+        few, many, large = trial(FEW, 1), trial(MANY, 1), trial(FEW, rows)
         others = sum(_size(store.folder / EXPORTS[label].file) for label in formats)
         exported = others / (store.count * row)
-    bytes_more = (8 * plan.outcome_numbers * (rows[1] - rows[0]), row * (rows[1] - rows[0]))
-    put_byte, merge_byte = (max(0.0, seconds[1][k] - seconds[0][k]) / bytes_more[k] for k in range(2))
-    return (seconds[0][0], put_byte), (seconds[0][1], merge_byte), exported
+    chunk = max(0.0, many[1] - few[1]) / (MANY - FEW)
+    put_byte = max(0.0, large[0] - many[0]) / (8 * max(1, plan.outcome_numbers) * (rows - 1))
+    byte = max(0.0, large[1] + large[2] - few[1] - few[2]) / (FEW * row * (rows - 1))
+    return (many[0], put_byte), (max(0.0, first[1] + first[2] - FEW * chunk), chunk, byte), exported
+
+
+def _taken(action: Callable[[], object]) -> float:
+    """Seconds that something takes."""
+    begun = clock.perf_counter()
+    action()
+    return clock.perf_counter() - begun
 
 
 def _memory(plan: Plan, measured: Measured, size: int, cores: int) -> int:

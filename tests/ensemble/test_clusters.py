@@ -23,6 +23,7 @@ from symdyn.cli import main, sweep_on_cluster
 from symdyn.ensembles import prediction, run, slurm
 from symdyn.ensembles.claims import Claims
 from symdyn.ensembles.cluster import Cluster, in_time, read_cluster
+from symdyn.ensembles.exports import EXPORTS, Export
 from symdyn.ensembles.plan import plan
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.sweep_file import read_sweep
@@ -493,6 +494,38 @@ def test_a_prediction_is_arithmetic_for_any_number_of_motions(planned, measured)
     assert slow.speedup(1) == 1 and slow.speedup(4) == pytest.approx(1.6) and measured.speedup(3) > 0
 
 
+def test_times_of_merging_are_those_of_chunks_bytes_and_what_is_done_once(planned, tmp_path, monkeypatch):
+    """By a clock that goes on only where something is written, by known amounts."""
+    now, loaded = [0.0], []
+    made = run.Store(tmp_path, 1, 1, {})
+
+    def put(self, done):
+        now[0] += 1e-3 + 2e-9 * sum(column.nbytes for column in done.columns.values())
+
+    def finish(self, about, times, block):
+        nonlocal made
+        made = self
+        now[0] += 0.05 + 4e-3 * self.n_chunks + 1e-9 * self.count * planned.row
+
+    def export(ensemble, path):
+        now[0] += 0.02 + 5e-9 * made.count * planned.row + 3.0 * (not loaded)
+        loaded.append(made)
+        path.touch()
+
+    monkeypatch.setattr(prediction, "clock", argparse.Namespace(perf_counter=lambda: now[0]))
+    monkeypatch.setattr(prediction, "Ensemble", lambda folder: folder)
+    monkeypatch.setattr(run.Store, "put", put)
+    monkeypatch.setattr(run.Store, "finish", finish)
+    monkeypatch.setitem(EXPORTS, "slow", Export("ensemble.slow", "numpy", "", export))
+    for once in (0.05 + 0.02 + 3.0, 0.05 + 0.02):  # the package of the format is loaded by the first of them
+        put_seconds, merge, _ = prediction._disk(planned, tmp_path, ("slow",))
+        assert put_seconds == pytest.approx((1e-3, 2e-9), rel=1e-3)
+        assert merge == pytest.approx((once, 4e-3, 6e-9), rel=1e-3)
+    measured = prediction.Measured(np.ones(2), 1.0, 0.0, put_seconds, merge, 1.0, 0.0, 0, 0.0)
+    few, many = (prediction.predict(replace(planned, size=size), measured, 10**6, 1, 1) for size in (1000, 100))
+    assert many.merge - few.merge == pytest.approx(9000 * 4e-3, rel=1e-3)
+
+
 def test_chunks_for_a_cluster_are_lost_without_harm(planned, measured):
     free, slow = replace(planned, size=None), replace(measured, motion=20.0)
     assert prediction.fitted(planned, slow, 4, 1).size == 50  # as it was asked for
@@ -518,7 +551,7 @@ def test_limits_are_sorted_and_lie_where_the_prediction_passes_them(planned, mea
 
 
 def test_what_needs_more_time_to_be_put_together_than_there_is(planned, measured):
-    found = prediction.predict(replace(planned, size=None), replace(measured, merge=(0.0, 1.0)), 600, 4, 1)
+    found = prediction.predict(replace(planned, size=None), replace(measured, merge=(0.0, 0.0, 1.0)), 600, 4, 1)
     faults = prediction.contradictions(found, measured, Cluster("slurm", 4, 1, time=100.0), False)
     assert faults == [f"cluster.time: 100 s are asked for, but to put the results together is predicted to take "
                       f"{in_time(found.merge)}; ask for more time"]
