@@ -14,7 +14,7 @@ from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.backend.source import Source, render
 from symdyn.collector import collector_paused
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.functions.content import content_of
@@ -25,6 +25,8 @@ from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.given import Rolling
+
+FIRMWARE = "firmware"
 
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
@@ -50,8 +52,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     rolled       C only: whether statements that a function repeats, as for like bodies, become loops: "auto" where these are many
                  and the templates are the shipped ones, True wherever some are, False nowhere
 
-    Raises SymdynError for an unknown function, parameter, backend, method or a broken template, for another value of rolled, and
-    for loops that a backend has no words for.
+    Raises SymdynError for an unknown function, parameter, backend, method or a broken template, for another value of rolled, for
+    loops that a backend has no words for, and for events and rigid contacts that steps of firmware would not look for.
     """
     if standalone and equations.again is not None:
         equations = equations.again()
@@ -63,6 +65,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         rolled = rolled is True
         as_path(templates, "of the templates", "my_templates")
     names = groups.written(equations, functions, method if integrator and backend == "c" else None, baumgarte)
+    if backend == FIRMWARE and "rhs" in names:
+        check_no_events(equations)
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
         # Devices have no SIMD lanes within a thread.
@@ -71,6 +75,15 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         content = content_of(equations, names, standalone, bound, right_side, columns)
         return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads,
                       single=single, rolled=rolled)
+
+
+def check_no_events(equations: Equations) -> None:
+    """Raises ArgumentError for rigid contacts and events, which steps of firmware do not look for."""
+    if equations.contacts or equations.events:
+        what = [*(f"the rigid contact {c.name}" for c in equations.contacts),
+                *(f"the event {e.name}" for e in equations.events)][0]
+        raise ArgumentError(f"{equations.name}: files for firmware were asked for, but their steps have a fixed length and do not look for "
+                            f"{what}; leave it out, or take an FMU or the written C (module.write), whose integrators do")
 
 
 def rolling(rolled: object) -> Rolling:

@@ -17,19 +17,15 @@ from symdyn.backend.metadata import Sizes
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS, render, template_environment
 from symdyn.collector import collector_paused
-from symdyn.errors import ArgumentError
+from symdyn.emission import FIRMWARE, check_no_events, write_source
 from symdyn.folders import templates_folder
 from symdyn.formulation.equations import Equations
 from symdyn.functions.content import content_of
 from symdyn.functions.tapes import has_function
 from symdyn.kinds import flag
-from symdyn.pipeline import write_source
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.paths import as_path, writing
 
-BACKEND = "firmware"
-# Files that are the same for every mechanism, and where they go.
-_COPIED = {"clock.h": "test/clock.h", "cortex_m/startup.c": "cortex_m/startup.c", "cortex_m/memory.ld": "cortex_m/memory.ld"}
 # Copies of a function that a compiler specializes have its name and a suffix.
 _USAGE = re.compile(r":(\w+)(?:\.[\w.]+)?\t(\d+)\t")
 _CALL = re.compile(r"^(?:static )?(?:inline )?(?:int|double|void|const char \*|symdyn_real) ?\*?(\w+)\(.*\{$")
@@ -68,31 +64,23 @@ def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
     """See Equations.to_cmake."""
     folder = as_path(path, "of the CMake package", "generated/arm")
     with_jacobian = flag(jacobian, f"{equations.name}: jacobian")
-    if equations.contacts or equations.events:
-        what = [*(f"the rigid contact {c.name}" for c in equations.contacts),
-                *(f"the event {e.name}" for e in equations.events)][0]
-        raise ArgumentError(f"{equations.name}: a CMake package asked for, but its steps have a fixed length and do not look for "
-                            f"{what}; leave it out, or take an FMU or the written C (module.write), whose integrators do")
+    check_no_events(equations)
     whole = equations.again() if equations.again is not None else equations
     bound = some(specialize, [p.name for p in whole.symbols.parameters], "specialize", whole.name)
     names = ["rhs", *(CORRECTIONS if whole.constraints else ()), *(n for n in ("outputs", "energy") if has_function(whole, n))]
     if with_jacobian:
         names += ["jacobian_x", *(["jacobian_inputs"] if whole.symbols.inputs else [])]
     with collector_paused():
-        source = render(content_of(whole, names, True, bound, RightSide()), BACKEND, integrator=False)
+        source = render(content_of(whole, names, True, bound, RightSide()), FIRMWARE, integrator=False)
     metadata = source.metadata
     with writing(folder):
         written = write_source(source, folder)
-        for name, target in _COPIED.items():
-            written.append(folder / target)
-            written[-1].parent.mkdir(parents=True, exist_ok=True)
-            written[-1].write_text((templates_folder() / BACKEND / name).read_text(encoding="utf-8"), encoding="utf-8")
         stacks, compiler = stack_of(folder, metadata.name)
         chain = deepest(folder / "src" / f"{metadata.name}.c", stacks) if stacks else 0
         context = PackageContext(
             Package(metadata.name, metadata.formulation, symdyn.__version__, metadata.sizes, bool(source.program.intrinsics)),
             Stack(compiler, tuple(sorted(stacks.items())), chain) if stacks else None)
-        text = template_environment(templates_folder() / BACKEND).get_template("README.md.jinja").render(context.names())
+        text = template_environment(templates_folder() / FIRMWARE).get_template("README.md.jinja").render(context.names())
         written.append(folder / "README.md")
         written[-1].write_text(text, encoding="utf-8")
     return written

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.cli import main
+from symdyn.emission import emit, write_source
 from symdyn.lab.firmware import on_target, tools
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.targets.cmake import deepest, stack_of
@@ -174,6 +176,55 @@ def test_events_are_rejected(tmp_path):
     system.add_event("bounce", sd.position(ball)[1], direction=-1, reset={y.dot: -y.dot})
     with pytest.raises(sd.ArgumentError, match="do not look for the event bounce"):
         system.embedding().to_cmake(tmp_path)
+    with pytest.raises(sd.ArgumentError, match="do not look for the event bounce"):
+        emit(system.embedding(), "firmware")
+    assert "ball_step" not in emit(system.embedding(), "firmware", ["mass_matrix"]).files["include/ball/ball.h"]
+
+
+FORCES = """
+#include <cstdio>
+#include <two_link_arm/two_link_arm.hpp>
+namespace arm = two_link_arm;
+int main() {
+    const arm::model model(std::array<arm::real, arm::n_p>{%(params)s});
+    std::array<arm::real, arm::n_u> tau{};
+    const int code = model.inverse_dynamics(std::array<arm::real, arm::n_x>{%(x)s}, std::array<arm::real, arm::n_ud>{%(ud)s},
+                                            std::array<arm::real, arm::n_inputs>{0.7, -0.2}, tau);
+    for (arm::real v : tau) std::printf("%%.17g ", double(v));
+    return code;
+}
+"""
+
+
+@needs_cmake
+def test_the_command_line_writes_all_functions_for_firmware(tmp_path, capsys):
+    """Default functions, of which inverse dynamics take accelerations: the self-test in both kinds of numbers, and from C++."""
+    main(["generate", "two_link_arm", "--backend", "firmware", "--output", str(tmp_path)])
+    assert "inverse_dynamics" in capsys.readouterr().out
+    for real in ("double", "float"):
+        build = tmp_path / real
+        _run("cmake", "-S", tmp_path, "-B", build, f"-DTWO_LINK_ARM_REAL={real}", "-DTWO_LINK_ARM_TEST=ON",
+             "-DCMAKE_C_FLAGS=-Wall -Wextra -Wpedantic -Werror")
+        _run("cmake", "--build", build)
+        assert re.search(r"[1-9]\d* results compared, 0 wrong", _run(build / "two_link_arm_selftest"))
+    module, rates = sd.systems.two_link_arm().compile(), [1.5, -2.5]
+    values = {"params": module.default_parameters, "x": X, "ud": rates}
+    (tmp_path / "forces.cpp").write_text(FORCES % {what: ", ".join(repr(float(v)) for v in row) for what, row in values.items()})
+    _run("c++", "-std=c++17", "-I", tmp_path / "include", tmp_path / "forces.cpp", "-L", tmp_path / "double", "-ltwo_link_arm",
+         "-o", tmp_path / "forces")
+    found = np.array(_run(tmp_path / "forces").split(), dtype=float)
+    wanted = module.inverse_dynamics(X[:2], X[2:], rates, inputs=[0.7, -0.2])
+    assert np.abs(found - wanted).max() <= 1e-14 * np.abs(wanted).max()
+
+
+def test_functions_without_rhs_have_a_self_test_for_firmware(tmp_path):
+    folder = tmp_path / "pendulum"
+    write_source(emit(sd.systems.pendulum().embedding(), "firmware", ["inverse_dynamics"]), folder)
+    compiler = find_compiler()
+    assert compiler is not None and compiler.command is not None
+    _run(*compiler.command, "-std=c99", "-Wall", "-Wextra", "-Werror", "-I", folder / "include", folder / "src" / "pendulum.c",
+         folder / "test" / "selftest.c", "-lm", "-o", folder / "selftest")
+    assert re.search(r"[1-9]\d* results compared, 0 wrong", _run(folder / "selftest"))
 
 
 def test_a_path_that_is_none_is_rejected():
