@@ -36,8 +36,8 @@ PATIENCE = 60.0
 LEAST = 0.3
 # Motions that are computed at once in a measurement, at most.
 AT_ONCE = 4000
-# Chunks of scratch results that are put together, and bytes of the large ones.
-FEW, MANY, TRIAL_BYTES = 2, 66, 2**25
+# Chunks of scratch results that are put together; samples in a small one, and bytes of it at the most; bytes of all large ones.
+FEW, MANY, SMALL, SMALL_BYTES, TRIAL_BYTES = 2, 66, 64, 2**16, 2**25
 # Files in a folder from which on listing it takes seconds on a cluster's file system.
 COMFORTABLE = 100_000
 # Probability within which the mean of all motions is, by Student's distribution of the ten.
@@ -324,12 +324,15 @@ def _disk(plan: Plan, folder: Path,
     The first results are the smallest, in which what a process does once, such as loading the packages of formats, is all that
     takes time. Later ones differ in the number of chunks alone, or in their bytes alone.
     """
-    row = max(1, plan.row)
-    rows = max(2, TRIAL_BYTES // (FEW * row))
+    row, out = plan.row, 8 * plan.outcome_numbers
+    small = max(1, min(SMALL, SMALL_BYTES // row))
+    rows = max(small + 1, TRIAL_BYTES // (FEW * row))
     random = np.random.default_rng(0)
 
     def block(first: int, stop: int) -> np.ndarray:
-        drawn = plan.samples.block(0, min(stop - first, plan.samples.count))
+        n = min(stop - first, plan.samples.count)
+        at = first % (plan.samples.count - n + 1)
+        drawn = plan.samples.block(at, at + n)
         return np.resize(drawn, (stop - first, len(plan.samples.names)))
 
     with tempfile.TemporaryDirectory(prefix=".symdyn-dry-run-", dir=_there(folder)) as name:
@@ -347,14 +350,15 @@ def _disk(plan: Plan, folder: Path,
             return put / n_chunks, together, export
 
         store: Store
-        first = trial(FEW, 1, 1)
-        few, many, large = trial(FEW, 1), trial(MANY, 1), trial(FEW, rows)
+        first = trial(FEW, small, 1)
+        few, many, large = trial(FEW, small), trial(MANY, small), trial(FEW, rows)
         others = sum(_size(store.folder / EXPORTS[label].file) for label in formats)
         exported = others / (store.count * row)
-    chunk = max(0.0, many[1] - few[1]) / (MANY - FEW)
-    put_byte = max(0.0, large[0] - many[0]) / (8 * max(1, plan.outcome_numbers) * (rows - 1))
-    byte = max(0.0, large[1] + large[2] - few[1] - few[2]) / (FEW * row * (rows - 1))
-    return (many[0], put_byte), (max(0.0, first[1] + first[2] - FEW * chunk), chunk, byte), exported
+    put_byte = max(0.0, large[0] - many[0]) / max(1, out * (rows - small))
+    together, export = (max(0.0, large[k] - few[k]) / (FEW * row * (rows - small)) for k in (1, 2))
+    chunk = max(0.0, (many[1] - few[1]) / (MANY - FEW) - small * row * together)
+    once = max(0.0, first[1] + first[2] - FEW * (chunk + small * row * (together + export)))
+    return (max(0.0, many[0] - small * out * put_byte), put_byte), (once, chunk, together + export), exported
 
 
 def _taken(action: Callable[[], object]) -> float:
