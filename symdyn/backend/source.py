@@ -42,6 +42,7 @@ from symdyn.backend.methods import Method, method_of, needs_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import Reference, make_reference
+from symdyn.backend.right_side import METHOD
 from symdyn.backend.single import in_single
 from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
@@ -132,7 +133,7 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
+           integrator: bool = True, batch: bool = False, method: str = METHOD, states: int = 2,
            only: Sequence[str] = (), threads: bool = False, single: bool = False,
            rolled: Rolling = "auto") -> Source:
     """Render a backend's files.

@@ -35,6 +35,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import symdyn as sd
 from symdyn.errors import SimulationWarning
+from symdyn.runtime.integrating.methods import COMPILED
 
 SPAN = 20.0
 N_SINES, N_PAIRS = 4, 3
@@ -45,7 +46,6 @@ PULSES: dict[str, Any] = {
 # Where they are one half.
 HALVES = {"bell": (-np.sqrt(np.log(2)), np.sqrt(np.log(2))), "peak": (-1, 1), "window": (0, 10), "roof": (-0.5, 0.5),
           "box": (-1, 1)}
-COMPILED = ("dop853", "bs54", "taylor", "radau", "radau5", "gauss")
 SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 TOLERANCES = (1e-4, 1e-8, 1e-11)
 # Largest distance of an event from a zero, as a part of the span, with closed forms as exact.

@@ -25,7 +25,6 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-METHODS = ("dop853", "bs54", "taylor", "gauss", "radau", "radau5")
 PART = 20       # of the duration of a mechanism that is simulated
 SECONDS = 900   # for one mechanism in one tree
 
@@ -91,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", metavar="COMMIT", default="HEAD", help="default HEAD: what is not committed yet")
     parser.add_argument("--names", nargs="*", metavar="NAME", help="of the catalogue (default all that both trees have)")
-    parser.add_argument("--methods", nargs="*", default=METHODS, metavar="METHOD", help=f"default {' '.join(METHODS)}")
+    parser.add_argument("--methods", nargs="*", metavar="METHOD", help="default: all that are compiled")
     parser.add_argument("--measure", type=Path, metavar="FILE", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.measure:
@@ -99,14 +98,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     sys.path.insert(0, str(ROOT))
     from symdyn import systems
+    from symdyn.backend.methods import METHODS
     from tests.checks.commits import tree_of
 
+    methods = options.methods or list(METHODS)
     differing = 0
     with tree_of(options.against) as other:
-        print(f"{'':36}" + "".join(f"{method:>10}" for method in options.methods), flush=True)
+        print(f"{'':36}" + "".join(f"{method:>10}" for method in methods), flush=True)
         for name in options.names or systems.names():
-            now, then = (measured(root, name, options.methods) for root in (ROOT, other))
-            found = {method: difference(now[method], then[method]) for method in options.methods}
+            now, then = (measured(root, name, methods) for root in (ROOT, other))
+            found = {method: difference(now[method], then[method]) for method in methods}
             other_bits = {method: text for method, text in found.items() if text not in ("=", "-")}
             differing += len(other_bits)
             print(f"{name:36}" + "".join(f"{text if method not in other_bits else 'differs':>10}"

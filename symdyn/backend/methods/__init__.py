@@ -10,7 +10,7 @@ from symdyn.backend.packed import NAME as PACKED
 from symdyn.errors import SymdynError
 from symdyn.shown import shown
 
-METHODS = {method.name: method for method in (DOP853, BS54, RADAU, RADAU5, GAUSS, TAYLOR)}
+METHODS = {method.name: method for method in (DOP853, BS54, GAUSS, TAYLOR, RADAU, RADAU5)}
 
 __all__ = ["METHODS", "Method", "Tableau", "method_of", "needs_of"]
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.methods import METHODS as RECORDS
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.consistent import check_start
 from symdyn.runtime.contact_numbers import check_contact_numbers
@@ -48,7 +49,8 @@ if TYPE_CHECKING:
 
 # Bytes up to which steps are kept.
 KEPT = 2**22
-METHODS = (DEFAULT, "bs54")
+# Methods whose steps are carried back: explicit pairs.
+METHODS = tuple(m.name for m in RECORDS.values() if m.tableau is not None)
 # Step of differences by time of the cost where an event ends the motion, of the time.
 DIFFERENCE = 1e-3
 

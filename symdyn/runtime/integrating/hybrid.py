@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.c_records import codes_of, fields_of
+from symdyn.backend.methods import METHODS as RECORDS
 from symdyn.backend.right_side import RightSide
 from symdyn.contact_kinds import CLUTCH
 from symdyn.runtime import contact_laws as laws
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 CODES = SimpleNamespace(**codes_of("runtime/hybrid.h"))
 # Methods whose steps need no look in between; the law of impacts that C knows.
-METHODS, NEWTON = ("dop853", "bs54", "radau", "radau5"), "newton"
+METHODS, NEWTON = tuple(m.name for m in RECORDS.values() if m.template in ("explicit", "radau")), "newton"
 # Phases, and attempted steps, of one call.
 MOST_PHASES, MOST_STEPS = 256, 20_000
 CONTACTS, EVENTS, RHS, SHARED = "contacts", "events", "rhs", "contacts_shared"

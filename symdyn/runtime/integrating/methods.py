@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
+from symdyn.backend.methods import METHODS
 from symdyn.backend.right_side import METHOD
 from symdyn.errors import ArgumentError
 from symdyn.runtime.inputs.inputs import Inputs
@@ -26,15 +27,18 @@ LARGEST_MATRICES = 2**29
 class CompiledMethod:
     """A method of the C backend.
 
-    needs    functions that the module must have
     unfit    why it does not take a module or inputs, with what to use instead; empty if it does
     kinked   what tolerances are multiplied by where functions of inputs may have kinks, which its estimate of errors underrates
     """
 
     name: str
-    needs: tuple[str, ...] = ()
     unfit: Callable[[Module, Inputs | None], str] = lambda module, inputs: ""
     kinked: float = 1.0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Functions that the module must have."""
+        return METHODS[self.name].needs
 
 
 def _constrained(module: Module) -> str:
@@ -94,13 +98,13 @@ def _implicit(stages: int) -> Callable[[Module, Inputs | None], str]:
     return unfit
 
 
-COMPILED = {m.name: m for m in (
-    CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
-    CompiledMethod(SERIES, unfit=_not_expanded),
+# Those that do not take every module or input, or need tighter tolerances.
+_PARTICULAR = (
+    CompiledMethod("gauss", _not_collocated), CompiledMethod(SERIES, _not_expanded),
     # Only 10 r^(1/4) of its estimate counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
-    CompiledMethod("radau", ("jacobian_x",), _implicit(5), kinked=0.01),
-    CompiledMethod("radau5", ("jacobian_x",), _implicit(3), kinked=0.01),
-)}
+    CompiledMethod("radau", _implicit(5), kinked=0.01), CompiledMethod("radau5", _implicit(3), kinked=0.01),
+)
+COMPILED = {name: CompiledMethod(name) for name in METHODS} | {m.name: m for m in _PARTICULAR}
 
 
 def with_own_tolerances(request: Request, method: str) -> Request:
