@@ -6,7 +6,7 @@ One table that is written by, read by, and that the schema comes from.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -90,7 +90,7 @@ class Form:
         return " ".join((inspect.getdoc(self.made) or "").split("\n\n")[0].split())
 
 
-def _forms(kinds: list[type], given: Mapping[str, Callable[[Any], Any]]) -> list[Form]:
+def _forms(kinds: Sequence[type], given: Mapping[str, Callable[[Any], Any]]) -> list[Form]:
     return [Form(kind.__name__, kind, kind, given) for kind in kinds]
 
 
@@ -101,16 +101,14 @@ def _only(values: Any) -> Any:
 _COORDINATES = {"coordinates": lambda j: None if j.unnamed else j.coordinates,
                 "coordinate": lambda j: None if j.unnamed else j.coordinates[0], "speed": lambda j: _only(j.speeds),
                 "velocity": lambda j: "body" if j.body_velocity else "parent", "units": lambda j: j.coordinate_units}
-JOINTS = _forms([joints.Fixed, joints.Revolute, joints.Prismatic, joints.Cylindrical, joints.Universal, joints.Planar,
-                 joints.Spherical, joints.Free, joints.Helical, joints.Custom, joints.Modal], _COORDINATES)
+JOINTS = _forms(joints.KINDS, _COORDINATES)
 LOOPS = [*(f for f in JOINTS if f.kind not in (joints.Free, joints.Modal)), *_forms([closures.Rod, closures.Gear], {})]
 _LABEL = {"name": lambda load: load.label}
 LOADS = [Form("force", System.add_force, Force, _LABEL), Form("torque", System.add_torque, Torque, _LABEL),
          Form("joint_force", System.add_joint_force, JointForce, {**_LABEL, "value": lambda load: load.values}),
          Form("spring_damper", System.add_spring_damper, SpringDamper, _LABEL),
          Form("force_between", System.add_force_between, ForceBetween, _LABEL),
-         *_forms([elements.AddedMass, elements.Buoyancy, elements.Drag, elements.LinearDamping, elements.LinearStiffness,
-                  elements.MooringLine, elements.Thrust, elements.WaveExcitation], _LABEL)]
+         *_forms(elements.KINDS, _LABEL)]
 _FRICTION = {"friction": lambda c: (c.static, c.kinetic)}
 CONTACTS = [Form("Contact", contact.Contact, contact.Contact, {**_FRICTION, "shape": lambda c: (c.on_a, c.on_b)}),
             Form("Stop", contact_joints.Stop, contact_joints.Stop,

@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 
 import symdyn as sd
+from symdyn.model.joints import KINDS
 
 AXES = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1], "w": [sp.Rational(3, 5), 0, sp.Rational(4, 5)]}
 
@@ -30,7 +31,7 @@ def joint(kind: str, name: str, parent: Any, child: Any, **place: Any) -> Any:
         place["orientation"] = sd.EulerParameters()
         where = list(sd.coordinates(f"x{name} y{name} z{name}")) if kind[:2] == "Fr" else []
         place["coordinates"] = [*where, *sd.coordinates(" ".join(f"e{i}{name}" for i in range(4)))]
-    types = {"Fr": sd.Free, "Sp": sd.Spherical, "Un": sd.Universal, "Cy": sd.Cylindrical, "Pl": sd.Planar}
+    types = {kind.__name__[:2]: kind for kind in KINDS}
     return types[kind[:2]](name, parent, child, **place)
 
 

@@ -11,3 +11,7 @@ from symdyn.model.elements.wind import Drag, Thrust
 
 __all__ = ["Action", "AddedMass", "Box", "Buoyancy", "Drag", "Element", "LinearDamping", "LinearStiffness",
            "MooringLine", "Site", "Thrust", "Validity", "WaveExcitation"]
+
+KINDS: tuple[type[Element | AddedMass], ...] = tuple(
+    kind for kind in map(globals().get, __all__)
+    if isinstance(kind, type) and issubclass(kind, (Element, AddedMass)) and kind is not Element)

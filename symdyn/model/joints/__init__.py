@@ -15,3 +15,6 @@ from symdyn.model.joints.universal import Universal
 
 __all__ = ["Custom", "Cylindrical", "Fixed", "Free", "Helical", "Joint", "JointMotion", "Modal", "Planar", "Prismatic",
            "Revolute", "Spherical", "Universal"]
+
+KINDS: tuple[type[Joint], ...] = tuple(kind for kind in map(globals().get, __all__)
+                                       if isinstance(kind, type) and issubclass(kind, Joint) and kind is not Joint)
