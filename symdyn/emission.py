@@ -32,22 +32,27 @@ FIRMWARE = "firmware"
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
-         batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
-         adjoint: tuple[str, ...] | None = None, held: tuple[str, ...] = (),
-         followed: tuple[str, ...] = (), open_contacts: bool = False, threads: bool = False,
-         single: bool = False, rolled: Rolling = "auto") -> Source:
+         batch: bool = False, method: str = METHOD, states: int = 2, rolled: Rolling = "auto") -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
-    specialize   parameters, by symbol or name, that become numbers in the code and are folded
+    integrator   C only: with an integrator of rhs
     work         rhs gets one more state at the end: the work of all loads but gravity and springs
     baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
     batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
     method       C only: the integrator's, one of symdyn.backend.methods.METHODS; what it needs besides rhs is emitted with it
-    sensitivities   what x is differentiated by in further states of rhs, see symdyn.backend.right_side.RightSide
-    adjoint      what weights of x_dot are carried back to by further functions, see RightSide
-    held, followed   inputs with derivatives along these further states, see RightSide
-    open_contacts   leave out what closed rigid contacts do, see RightSide
-    threads      C only: the text of a kernel that integrates many motions by a thread each, see RightSide; single: with floats
+    The others, and what is raised: see `emit_with`.
+    """
+    right_side = RightSide(work=work, baumgarte=baumgarte, method=method, lanes=batch, integrated=integrator)
+    return emit_with(equations, backend, functions, right_side, templates, standalone, specialize, states, rolled)
+
+
+def emit_with(equations: Equations, backend: str, functions: Sequence[str] | None, right_side: RightSide,
+              templates: str | os.PathLike | None = None, standalone: bool = True,
+              specialize: Mapping[Any, float] | None = None, states: int = 2, rolled: Rolling = "auto") -> Source:
+    """The source of the named functions (None: the standard ones, those the formulation has) in a backend.
+
+    right_side   what rhs, if it is among them, is more than the function, and which integrator it has
+    specialize   parameters, by symbol or name, that become numbers in the code and are folded
     states       how many random states the reference vectors of a standalone source begin with
     rolled       C only: whether statements that a function repeats, as for like bodies, become loops: "auto" where these are many
                  and the templates are the shipped ones, True wherever some are, False nowhere
@@ -59,22 +64,21 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         equations = equations.again()
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     kinds.text(backend, f"{equations.name}: the backend", "c")
-    method_of(method)
+    method_of(right_side.method)
     rolled = rolling(rolled)
     if templates is not None:
         rolled = rolled is True
         as_path(templates, "of the templates", "my_templates")
-    names = groups.written(equations, functions, method if integrator and backend == "c" else None, baumgarte)
+    compiled = right_side.integrated and backend == "c"
+    names = groups.written(equations, functions, right_side.method if compiled else None, right_side.baumgarte)
     if backend == FIRMWARE and "rhs" in names:
         check_no_events(equations)
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
         # Devices have no SIMD lanes within a thread.
-        columns = columns_of if backend == "c" and not standalone and not threads and templates is None else None
-        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts, threads)
+        columns = columns_of if backend == "c" and not standalone and not right_side.threads and templates is None else None
         content = content_of(equations, names, standalone, bound, right_side, columns)
-        return render(content, backend, templates, standalone, integrator, batch, method, states, threads=threads,
-                      single=single, rolled=rolled)
+        return render(content, backend, templates, standalone, right_side, states, rolled=rolled)
 
 
 def check_no_events(equations: Equations) -> None:
@@ -82,8 +86,8 @@ def check_no_events(equations: Equations) -> None:
     if equations.contacts or equations.events:
         what = [*(f"the rigid contact {c.name}" for c in equations.contacts),
                 *(f"the event {e.name}" for e in equations.events)][0]
-        raise ArgumentError(f"{equations.name}: files for firmware were asked for, but their steps have a fixed length and do not look for "
-                            f"{what}; leave it out, or take an FMU or the written C (module.write), whose integrators do")
+        raise ArgumentError(f"{equations.name}: files for firmware were asked for, but their steps have a fixed length and do not look "
+                            f"for {what}; leave it out, or take an FMU or the written C (module.write), whose integrators do")
 
 
 def rolling(rolled: object) -> Rolling:

@@ -13,7 +13,7 @@ import numpy as np
 from symdyn.backend.packed import Pattern
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source
-from symdyn.emission import emit, write_source
+from symdyn.emission import emit, emit_with, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
@@ -66,15 +66,11 @@ class Libraries:
 
     def _source(self, what: str | RightSide) -> Source:
         if isinstance(what, RightSide):
-            names = groups.of_right_side(self.equations, what)
-            return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
-                        work=what.work, baumgarte=what.baumgarte, method=what.method,
-                        sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held,
-                        followed=what.followed, open_contacts=what.open_contacts, threads=what.threads, batch=what.lanes,
-                        integrator=what.integrated, single=what.single, rolled=self.rolled)
-        names = groups.with_function(self.equations, what)
-        return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
-                    batch=what == BATCH, rolled=self.rolled)
+            names, right_side = groups.of_right_side(self.equations, what), what
+        else:
+            names, right_side = groups.with_function(self.equations, what), RightSide(lanes=what == BATCH)
+        return emit_with(self.equations, self.backend, names, right_side, self.templates, False, self.specialize,
+                         rolled=self.rolled)
 
     def __call__(self, what: str | RightSide) -> Library:
         """The library for a right-hand side, or that holds a function."""

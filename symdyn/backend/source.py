@@ -42,7 +42,7 @@ from symdyn.backend.methods import Method, method_of, needs_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import Reference, make_reference
-from symdyn.backend.right_side import METHOD
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.single import in_single
 from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
@@ -133,24 +133,21 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True, batch: bool = False, method: str = METHOD, states: int = 2,
-           only: Sequence[str] = (), threads: bool = False, single: bool = False,
-           rolled: Rolling = "auto") -> Source:
+           right_side: RightSide | None = None, states: int = 2, only: Sequence[str] = (), rolled: Rolling = "auto") -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
     standalone   with reference vectors, header and example; False for a module that is only loaded
-    integrator   C only: with the compiled integrator (needs the function rhs)
-    batch        C only: with rhs, and the integrator if there is one, of many states at once
-    method       the integrator's, one of symdyn.backend.methods.METHODS
-    threads      C only: with the integrator of many trajectories by a thread each, which also compiles as CUDA C
-    single       of texts for devices: whether they compute in single precision
+    right_side   what the content was made for, of which the integrator, lanes, threads and precision are those of C, where rhs
+                 is in the content; None: RightSide()
     rolled       whether what functions repeat becomes loops, see symdyn.backend.program.build; not in texts for devices
     states       how many random states the reference vectors begin with
     only         the templates of the files that are wanted, without reference vectors; none: all, or the first one where they are
                  not standalone
     Raises SymdynError for an unknown backend, a broken template, and loops that a backend has no words for.
     """
+    right_side = right_side or RightSide()
+    threads, single = right_side.threads, right_side.single
     folders = template_folders(templates)
     known = backends(templates)
     if backend not in known:
@@ -175,12 +172,12 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         shipped = next(f / backend for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         on_vectors = functools.partial(batch_of, shipped, dialect, program, content.tapes, content.titles, leaves,
                                        content.singular_fallback, content.jacobians)
-        lanes = on_vectors() if batch and "rhs" in content.tapes else None
+        lanes = on_vectors() if right_side.lanes and "rhs" in content.tapes else None
         many = on_vectors(content.rows) if content.rows and not standalone else None
-    integrator = integrator and "rhs" in content.tapes
+    integrator = right_side.integrated and "rhs" in content.tapes
     if single:
         _check_single(content.name, program)
-    record = method_of(method)
+    record = method_of(right_side.method)
     asks = integrator and backend == "c" and record.gather is not None
     gathered = record.gather(content, program, dialect, leaves) if asks and record.gather is not None else Gathered()
     # A module that is only loaded is compiled as several units; the functions of a series belong to the integrator.

@@ -13,6 +13,7 @@ import time as clock
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -336,22 +337,28 @@ def _disk(plan: Plan, folder: Path,
         return np.resize(drawn, (stop - first, len(plan.samples.names)))
 
     with tempfile.TemporaryDirectory(prefix=".symdyn-dry-run-", dir=_there(folder)) as name:
-        def trial(n_chunks: int, n: int, times: int = 2) -> tuple[float, float, float]:
-            """Seconds: a chunk of n rows, putting so many of them together, exporting the result; the least of some times."""
-            nonlocal store
+        def kept(store: Store, k: int, columns: dict[str, np.ndarray]) -> None:
+            store.put(Done(k, columns))
+
+        def export_all(store: Store) -> None:
+            for label in formats:
+                EXPORTS[label].write(Ensemble(store.folder), store.folder / EXPORTS[label].file)
+
+        def trial(n_chunks: int, n: int, times: int = 2) -> tuple[Store, tuple[float, float, float]]:
+            """The store, and seconds: a chunk of n rows, putting so many of them together, exporting the result; the least of
+            some times."""
             store = Store(Path(name) / f"{n_chunks}-{n}", n_chunks * n, n, plan.columns)
             store.begin()
             columns = {label: random.random((n, *shape)) for label, shape in plan.columns.items()}
             about = {**plan.about(), "count": store.count}
-            put = _taken(lambda: [store.put(Done(k, columns)) for k in range(n_chunks)])
+            put = sum(_taken(partial(kept, store, k, columns)) for k in range(n_chunks))
             together = min(_taken(lambda: store.finish(about, plan.setting.times, block)) for _ in range(times))
-            export = min(_taken(lambda: [EXPORTS[label].write(Ensemble(store.folder), store.folder / EXPORTS[label].file)
-                                         for label in formats]) for _ in range(times))
-            return put / n_chunks, together, export
+            export = min(_taken(partial(export_all, store)) for _ in range(times))
+            return store, (put / n_chunks, together, export)
 
-        store: Store
-        first = trial(FEW, small, 1)
-        few, many, large = trial(FEW, small), trial(MANY, small), trial(FEW, rows)
+        first = trial(FEW, small, 1)[1]
+        few, many = trial(FEW, small)[1], trial(MANY, small)[1]
+        store, large = trial(FEW, rows)
         others = sum(_size(store.folder / EXPORTS[label].file) for label in formats)
         exported = others / (store.count * row)
     put_byte = max(0.0, large[0] - many[0]) / max(1, out * (rows - small))

@@ -71,7 +71,8 @@ def write_cmake(equations: Equations, path: Any, jacobian: bool = False,
     if with_jacobian:
         names += ["jacobian_x", *(["jacobian_inputs"] if whole.symbols.inputs else [])]
     with collector_paused():
-        source = render(content_of(whole, names, True, bound, RightSide()), FIRMWARE, integrator=False)
+        right_side = RightSide(integrated=False)
+        source = render(content_of(whole, names, True, bound, right_side), FIRMWARE, right_side=right_side)
     metadata = source.metadata
     with writing(folder):
         written = write_source(source, folder)

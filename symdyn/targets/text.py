@@ -37,7 +37,7 @@ def source_for(equations: Equations, target: str, names: Sequence[str] | None = 
     with collector_paused():
         derivatives = [f"{name}_by_{by}" for name in functions for by in BY if differentiable(equations, name, by)]
         content = content_of(equations, [*functions, *derivatives], False, bound, RightSide(), all_columns_of)
-        return render(content, DIALECT, standalone=False, integrator=False, only=(TARGETS[target],))
+        return render(content, DIALECT, standalone=False, right_side=RightSide(integrated=False), only=(TARGETS[target],))
 
 
 def differentiable(equations: Equations, name: str, by: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.pipeline import emit
@@ -48,7 +49,7 @@ def every_operation() -> Source:
     tape = Tape.of(r, rhs=np.array(entries, dtype=object))
     groups: dict[str, list[str]] = {"q": names, "u": [], "z": [], "ud": [], "inputs": [], "p": ["k"]}
     content = Content("every", "no", {"rhs": tape}, {"rhs": "all operations"}, groups, {}, {"k": 0.7}, {})
-    return render(content, "c", standalone=False, integrator=False, batch=True)
+    return render(content, "c", standalone=False, right_side=RightSide(lanes=True, integrated=False))
 
 
 def compilers() -> dict[str, Compiler]:
@@ -129,7 +130,7 @@ def test_long_functions_in_parts() -> None:
     tape = Tape.of(r, rhs=np.array(values[-3:], dtype=object))
     groups: dict[str, list[str]] = {"q": names, "u": [], "z": [], "ud": [], "inputs": [], "p": ["k"]}
     source = render(Content("long", "no", {"rhs": tape}, {"rhs": "long"}, groups, {}, {"k": 0.3}, {}), "c", standalone=False,
-                    integrator=False, batch=True)
+                    right_side=RightSide(lanes=True, integrated=False))
     parts = len(source.program.functions[0].parts)
     text = next(iter(source.files.values()))
     assert parts > 4 and f"_lanes_{parts}(" in text and f"_lanes_{parts + 1}(" not in text

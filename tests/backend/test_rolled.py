@@ -87,7 +87,7 @@ def rolled_and_straight(equations: Equations, monkeypatch: pytest.MonkeyPatch, b
                         name: str = "rhs") -> tuple[Source, Source]:
     """A function with loops, and the same steps one after the other in one function, with the same products in sums."""
     content = content_of(equations, (name,), False, bound or {}, RightSide())
-    rolled = render(content, "c", standalone=False, integrator=False, rolled=True)
+    rolled = render(content, "c", standalone=False, right_side=RightSide(integrated=False), rolled=True)
     read = rendering.read_dialect
 
     def whole(folder: Path) -> Dialect:
@@ -99,7 +99,7 @@ def rolled_and_straight(equations: Equations, monkeypatch: pytest.MonkeyPatch, b
     with monkeypatch.context() as patched:
         patched.setattr(rendering, "read_dialect", whole)
         patched.setattr(rendering, "build", like)
-        return rolled, render(content, "c", standalone=False, integrator=False, rolled=False)
+        return rolled, render(content, "c", standalone=False, right_side=RightSide(integrated=False), rolled=False)
 
 
 def numbers(source: Source, folder: Path, states: int = 20, name: str = "rhs") -> np.ndarray:

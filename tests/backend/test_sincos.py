@@ -16,6 +16,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content, Source, render, template_folders
 from symdyn.errors import EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
@@ -34,7 +35,7 @@ def source(values: Callable[..., list[Any]], backend: str = "c", names: Sequence
     tape = Tape.of(recorder, f=values(recorder, *[recorder.leaf(name, COORDINATE) for name in names]))
     groups: dict[str, Sequence[str]] = {"q": names, "u": [], "z": [], "ud": [], "inputs": [], "p": []}
     content = Content("turning", "no", {"f": tape}, {"f": "sines and cosines"}, groups, {}, {}, {})
-    return render(content, backend, templates, standalone, integrator=False)
+    return render(content, backend, templates, standalone, RightSide(integrated=False))
 
 
 def sines(r: Recorder, *angles: Any) -> list[Any]:

@@ -11,7 +11,7 @@ import pytest
 import symdyn as sd
 from symdyn.backend import columns
 from symdyn.backend.right_side import RightSide
-from symdyn.emission import emit
+from symdyn.emission import emit_with
 from symdyn.functions.tapes import columns_of
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.library import CLibrary
@@ -24,8 +24,7 @@ def source(equations: Any, names: tuple[str, ...], looped: bool, held: tuple[str
     """A right-hand side with sensitivities, in a loop or with a piece of code for every column."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(columns, "LOOPED", 0 if looped else np.inf)
-        return emit(equations, "c", ("rhs",), standalone=False, integrator=False, sensitivities=names,
-                    held=held)
+        return emit_with(equations, "c", ("rhs",), RightSide(sensitivities=names, held=held, integrated=False), standalone=False)
 
 
 def text_of(made: Any) -> str:

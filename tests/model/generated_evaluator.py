@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content, render
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import CLibrary, PythonLibrary
@@ -20,7 +21,7 @@ def evaluator_of(tape: Tape, inputs: Sequence[str], backend: str) -> Any:
     (name,) = tape.outputs
     groups: dict[str, Sequence[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
     content = Content(name, "test", {name: tape}, {name: name}, {**groups, "inputs": inputs}, {}, {}, {})
-    source = render(content, backend, standalone=False, integrator=False)
+    source = render(content, backend, standalone=False, right_side=RightSide(integrated=False))
     text = next(iter(source.files.values()))
     library: Any
     if backend == "numpy":

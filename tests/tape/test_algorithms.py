@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content, render
 from symdyn.model.elements.catenary import Catenary
 from symdyn.model.elements.cube import Cube
@@ -171,7 +172,7 @@ def test_generated_python_has_the_text_of_the_package(name: str) -> None:
     tape = Tape.of(recorder, solve=recorder.call(intrinsic, [recorder.leaf(n, INPUT) for n in names]))
     groups = {group: names if group == "inputs" else [] for group in ("q", "u", "z", "ud", "inputs", "p")}
     content = Content("intrinsics", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
-    text, = render(content, "numpy", standalone=False, integrator=False).files.values()
+    text, = render(content, "numpy", standalone=False, right_side=RightSide(integrated=False)).files.values()
     module: dict[str, object] = {"__name__": "intrinsics"}
     exec(text, module)
     expected = intrinsic.rows(values.T)

@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
@@ -119,7 +120,7 @@ def unit_of(tape: Tape, names: list[str], backend: str, kind: int = INPUT) -> An
     groups: dict[str, list[str]] = {group: [] for group in ("q", "u", "z", "ud", "inputs", "p")}
     groups["inputs" if kind == INPUT else "p"] = names
     content = Content("intrinsics", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
-    source = render(content, backend, standalone=False, integrator=False)
+    source = render(content, backend, standalone=False, right_side=RightSide(integrated=False))
     text = next(iter(source.files.values()))
     if backend == "numpy":
         return PythonLibrary.from_source(text, "intrinsics")
