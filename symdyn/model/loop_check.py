@@ -10,7 +10,7 @@ import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear, Rod
-from symdyn.model.joints import Custom, Fixed, Free, Helical, Joint
+from symdyn.model.joints import Cylindrical, Fixed, Free, Joint, Modal, Planar, Prismatic, Revolute, Spherical, Universal
 from symdyn.model.quantity import Quantity, of_speeds
 from symdyn.model.symbols import Acceleration, Coordinate, GivenMotion, GivenRate, Input, Rate, symbols_of
 from symdyn.shown import shown
@@ -19,15 +19,17 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
 
 CARRIER = "carrier"
+# Joints whose coordinates a loop does not need: their rows come from the poses of the two bodies (Free closes no loop).
+FROM_POSES = (Cylindrical, Fixed, Free, Modal, Planar, Prismatic, Revolute, Rod, Spherical, Universal)
 
 
 def with_carriers(system: System) -> System:
-    """The system with every Helical and Custom joint that closes a loop taken apart.
+    """The system with every joint that closes a loop and is none of FROM_POSES, such as Helical or Custom, taken apart.
 
-    The coordinates of such a joint do not follow from the pose of its two bodies alone (a screw after several turns), so they
+    The coordinates of such a joint need not follow from the pose of its two bodies alone (a screw after several turns), so they
     become coordinates of the system: the joint carries a massless body, which is fixed to the child.
     """
-    screws = [j for j in system.loops if isinstance(j, (Helical, Custom))]
+    screws = [j for j in system.loops if isinstance(j, Joint) and not isinstance(j, FROM_POSES)]
     if not screws:
         return system
     result = copy.copy(system)

@@ -14,6 +14,8 @@ import sympy as sp
 import symdyn as sd
 from symdyn.formulation.constraints.rows import Gathered
 from symdyn.formulation.trees.equations import tree_of
+from symdyn.model.joints import Prismatic
+from symdyn.model.joints.axis import AxisJoint
 from symdyn.model.symbols import symbols_of
 from symdyn.tape import Tape
 from symdyn.tape.differentiate import forward
@@ -256,3 +258,25 @@ def test_a_second_hinge_on_the_same_axis_takes_nothing(axis: list) -> None:
     assert len(rows.names) + len(rows.gathered.trivial) == 5
     for values in (rows.C, rows.C_r, rows.C_dot, rows.remaining):
         assert np.abs(values).max(initial=0) < 1e-13
+
+
+class Slider(AxisJoint):
+    """A joint that the rows of loops do not know."""
+
+    kind = "slider"
+    coordinate_units = ("m",)
+    motion = Prismatic.motion
+    axis: Any
+
+
+@pytest.mark.parametrize("coordinates", ["relative", "absolute"])
+@pytest.mark.parametrize("kind", [sd.Prismatic, Slider])
+def test_a_kind_of_joint_without_rows_of_its_own_closes_loops_by_its_coordinates(kind: Any, coordinates: str) -> None:
+    """A free body on an inclined rail falls with e (e^T g), and does not turn."""
+    s = sd.System("rail", gravity=[0, 0, -10])
+    body = s.add_body("body", mass=2, inertia=[1, 2, 3])
+    s.add_joint(sd.Free("free", s.ground, body))
+    s.close_loop(kind("loop", s.ground, body, axis=[0.6, 0, 0.8]))
+    module = s.augmented(coordinates=coordinates).compile(backend="numpy")
+    rates = module.rhs(0.0, np.zeros(module.metadata.sizes.x))[module.metadata.sizes.q:]
+    assert rates[:6] == pytest.approx([-4.8, 0, -6.4, 0, 0, 0], abs=1e-12)

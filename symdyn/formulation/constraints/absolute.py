@@ -20,9 +20,9 @@ from symdyn.formulation.loads.site import has_roll_pitch_yaw, joint_with_ground
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Gear
 from symdyn.model.elements import Element, LinearStiffness
-from symdyn.model.joints import Custom, Free, Helical, Joint, Modal, Planar
+from symdyn.model.joints import Free, Joint, Modal, Planar
 from symdyn.model.loads import JointForce, expressions_of
-from symdyn.model.loop_check import carried
+from symdyn.model.loop_check import FROM_POSES, carried
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.points import Point
 from symdyn.model.record import Model, joint_speeds
@@ -132,7 +132,7 @@ def _allows_everything(joint: Joint, planar: bool) -> bool:
 
 
 def _needs_coordinates(joint: Joint, used: set[sp.Symbol | str]) -> bool:
-    if isinstance(joint, (Helical, Custom)) or joint.name in used:
+    if not isinstance(joint, FROM_POSES) or joint.name in used:
         return True
     if not all(isinstance(q, Coordinate) for q in joint.coordinates):
         return True
