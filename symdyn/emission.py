@@ -87,8 +87,8 @@ def check_no_events(equations: Equations) -> None:
         what = [*(f"the rigid contact {c.name}" for c in equations.contacts),
                 *(f"the event {e.name}" for e in equations.events)][0]
         raise ArgumentError(f"{equations.name}: files for firmware were asked for, but their steps have a fixed length and do "
-                            f"not look for {what}; leave it out, or take an FMU or the written C (module.write), whose integrators "
-                            "do")
+                            f"not look for {what}; leave it out, or take an FMU or the written C (module.write), whose "
+                            "integrators do")
 
 
 def rolling(rolled: object) -> Rolling:
