@@ -194,7 +194,8 @@ class Locator:
         self.unresolved = np.zeros(n_e, dtype=bool)
         self.starts = np.cumsum([0, *[len(record.reset) for record in self.records]])
         self.latest, self.repeated = np.inf, 0  # of resets
-        self.fired: list[int] = []  # the events of the latest time
+        self.fired: list[int] = []  # the events of the latest time, `at`
+        self.at = np.nan
         self.happened: list[Happened] = []
         self.too_quick: list[tuple[int, float]] = []  # quantities that vary too quickly, and from when on
         self.hidden: list[tuple[int, float]] = []  # those not proved to have no zeros between samples, and from when on
@@ -274,6 +275,8 @@ class Locator:
                 ends.append(middle)
                 continue
             end = states[panels.N - 2]
+            if left == self.at:
+                self._keep_sides(samples)
             wavy = self._undecided(samples, right, end) if divisible else None
             if wavy is not None and divisions < most:
                 divisions += 1
@@ -358,6 +361,13 @@ class Locator:
         leaves = self.module.metadata.event_leaves
         return self.module.evaluate(name, t, state, self.p, given, jets[list(leaves)].ravel())
 
+    def _keep_sides(self, samples: np.ndarray) -> None:
+        """Put quantities that have just vanished, and are at the end of a panel no more than rounding has left of them at their
+        zero, on the side that they go to: a panel may be as short as rounding, where a controller has an instant."""
+        value = samples[panels.N - 1]
+        fired = np.isin(np.arange(len(value)), self.fired)
+        samples[panels.N - 1] = np.where(fired & (value * self.side < 0) & (np.abs(value) <= np.abs(self.left)), -value, value)
+
     def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
         """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
         wavy = self.look & panels.undecided(samples)
@@ -408,7 +418,7 @@ class Locator:
         t = min(roots.values(), key=lambda s: abs(s - t_old))
         before = between(t)
         self.left = self.values(t, before)
-        self.known = t
+        self.known = self.at = t
         events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
         # Again at once, although its reset sends it away from zero: it goes less far than is resolved.
         no_time = abs(t - self.latest) <= self.resolution

@@ -844,6 +844,8 @@ class Solution:
             raise ArgumentError(f"{self.module.name}: {name} depends on the forces in the contact groups, which are known as "
                                 "impulses over steps alone; take them from sol.contact_groups")
         shape = self.module.shape(name)
+        if len(self.t) == 0:
+            return np.zeros((0, *shape))
         if not self._phases:
             return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(len(self.t), *shape)
         result = np.empty((len(self.t), *shape))
