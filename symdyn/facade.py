@@ -569,7 +569,7 @@ class MotionFacade:
         return equilibria(_motion(self), fixed, values, seconds)
 
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
-        """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
+        """Origin of an entry: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
 
         The contributions of each body, translational and rotational, and for k_tilde the centrifugal, Coriolis and gyroscopic
         ones. See symdyn.formulation.printed.provenance.

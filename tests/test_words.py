@@ -150,6 +150,13 @@ def test_public_docstrings_begin_sentences_with_their_subject() -> None:
     assert [(name, one) for name, text in texts.items() for one in sentences(" ".join(text.split())) if begins_late(one)] == []
 
 
+def test_public_docstrings_begin_with_a_verb_or_a_noun() -> None:
+    public = {**PUBLIC, **{name: getattr(sd, name) for name in sd.__all__}}
+    firsts = {name: (inspect.getdoc(thing) or "").partition(" ")[0] for name, thing in public.items()}
+    assert len(firsts) > 500
+    assert {name: first for name, first in firsts.items() if first in {"Where", "Whether", "How", "Which", "What"}} == {}
+
+
 # Marks of comments and of docstrings, behind which sentences begin; a sentence may also begin behind the end of another one.
 MARKS = re.compile(r"^.*?(?://+[/!<]*|/\*+|\{#-?|#:?|%|\"\"\"|^\s*[*-])\s*(?=[A-Z])")
 BEHIND = re.compile(r"(?:(?<=[.!?:]\s)|(?<=[.!?:]\s\s))(?=[A-Z])")

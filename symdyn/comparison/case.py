@@ -16,7 +16,7 @@ from symdyn.errors import CaseError
 
 @dataclass(frozen=True)
 class Slide:
-    """Where something is printed: section such as "3.5", title of the slide, line of the notes (or page).
+    """Place where something is printed: section such as "3.5", title of the slide, line of the notes (or page).
 
     >>> str(sd.Slide("3.4", "Pendulum", 12))
     '3.4, Pendulum, line 12'

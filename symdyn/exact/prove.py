@@ -97,7 +97,7 @@ class Proof:
 
 def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
           on: Scalar | Matrix | Equations | sp.Eq | Sequence[Scalar | sp.Eq] | None = None) -> Proof:
-    """Whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
+    """Decide whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
 
     a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too
     on     relations that hold: expressions that are zero, equations (sp.Eq), lists of these; or the equations of a mechanism,

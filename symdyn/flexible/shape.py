@@ -62,7 +62,7 @@ class Shape:
         return both
 
     def along(self, direction: str) -> bool:
-        """Whether it deflects in this direction alone.
+        """Test of whether it deflects in this direction alone.
 
         >>> bent = sd.Shape("x", [1.0]) + sd.Shape("y", [1.0])
         >>> sd.Shape("x", [1.0]).along("x"), bent.along("x")

@@ -151,7 +151,7 @@ class Point:
 
     def path(self, seen_from: Axes | None = None, t: Times | None = None, values: Motions | None = None,
              quantity: str = "position", components: Axes | None = None) -> np.ndarray:
-        """Where it is over time as seen from a frame, (n_t, 3), m: what an observer there draws.
+        """Path over time as seen from a frame, (n_t, 3), m: what an observer there draws.
 
         t          (n_t,) times, s
         values     symbol or name -> number, expression in sd.t, or function of t; see `numbers`

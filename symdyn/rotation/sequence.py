@@ -15,7 +15,7 @@ _OF_AXIS = {"X": "phi", "Y": "theta", "Z": "psi"}
 
 
 class Lock(NamedTuple):
-    """Where a sequence locks.
+    """Angles at which a sequence locks.
 
     sequence   its name
     second     the two values of the second angle in (-pi, pi], rad, SymPy numbers
@@ -90,7 +90,7 @@ def sequence_of(name: Any) -> EulerSequence:
 
 
 def gimbal_lock(sequence: str) -> Lock:
-    """Where a sequence locks: `.second`, the two values of its second angle, and `.fixed`, what R fixes there.
+    """Find where a sequence locks: `.second`, the two values of its second angle, and `.fixed`, what R fixes there.
 
     At these angles the first and third axis are parallel: R depends on the sum or the difference of the two angles alone,
     and G has no inverse. Tait-Bryan sequences lock at -pi/2 and pi/2, proper ones at 0 and pi.

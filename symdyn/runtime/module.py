@@ -569,7 +569,7 @@ class Module:
         return np.column_stack([np.broadcast_to(r, (length, r.shape[-1])) for r in flat])
 
     def sparsity(self, wrt: str = "x", of: str = "rhs") -> np.ndarray:
-        """Where the derivatives of a function by one of x, inputs, params, t, ud may differ from zero: bool, shaped as
+        """Pattern of the derivatives of a function by one of x, inputs, params, t, ud that may differ from zero: bool, shaped as
         `jacobian(of=of, wrt=[wrt])` gives them.
 
         It is read off the statements: True for an entry that is zero by numbers only. Raises ArgumentError as `jacobian`.
@@ -590,8 +590,8 @@ class Module:
         return result if result is not None else np.zeros(self.shape(name), dtype=bool)
 
     def jacobian_indices(self) -> Pattern | None:
-        """Where `jacobian_x` may differ from zero, as indices of rows and columns; None where that is unknown, such as for a
-        module without equations.
+        """Entries of `jacobian_x` that may differ from zero, as indices of rows and columns; None where that is unknown, such as
+        for a module without equations.
 
         >>> sd.systems.pendulum().compile(backend="numpy").jacobian_indices().columns
         array([1, 0])
@@ -610,7 +610,7 @@ class Module:
         return result
 
     def structure(self, name: str) -> np.ndarray | None:
-        """Where a function that is a matrix of derivatives, such as hessian_x, may differ from zero; None where that is unknown.
+        """Entries of a matrix of derivatives, such as hessian_x, that may differ from zero; None where that is unknown.
 
         >>> sd.systems.pendulum().compile(backend="numpy").structure("hessian_x").astype(int)
         array([[1, 0],
@@ -1013,7 +1013,7 @@ class Module:
     def stability(self, at: Start | None = None, params: States | None = None, t: float = 0.0, inputs: States | None = None,
                   free: Names | None = None, fixed: Numbers | None = None, hold: Names | None = None,
                   period: float | None = None, start: Start | None = None) -> Stability:
-        """Whether small disturbances of a state of rest, a steady motion or a periodic motion die out, with the evidence.
+        """Decide whether small disturbances of a state of rest, a steady motion or a periodic motion die out, with the evidence.
 
         at       an Equilibrium; or the state, as for `linearize`; where it is not on a steady motion, the periodic motion near
                  it is found first

@@ -125,7 +125,7 @@ class Actuation:
 
     @property
     def unique(self) -> bool:
-        """Whether no other values of the inputs that were sought make the motion (near these, where they enter nonlinearly).
+        """Uniqueness: no other values of the inputs that were sought make the motion (near these, where they enter nonlinearly).
 
         >>> x, tau = sd.coordinates("x"), sd.inputs("tau")
         >>> system = sd.System("cart")

@@ -263,9 +263,9 @@ class Equilibrium:
 
     @cached_property
     def stable(self) -> bool | None:
-        """Whether small disturbances stay small: True where the verdict is "stable", and at a neutral state of rest at a strict
-        minimum of the energy (Lagrange and Dirichlet), where undamped oscillations stay small; False where it is "unstable" or
-        "drifts"; else None.
+        """Stability, whether small disturbances stay small: True where the verdict is "stable", and at a neutral state of rest at
+        a strict minimum of the energy (Lagrange and Dirichlet), where undamped oscillations stay small; False where it is
+        "unstable" or "drifts"; else None.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.equilibrium(start={"q1": 3.0}).stable

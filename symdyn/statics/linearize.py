@@ -198,7 +198,7 @@ class Linearization:
 
     @cached_property
     def steadiness(self) -> Steadiness:
-        """Whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason.
+        """Test of whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.linearize({"q1": 0.0}).steadiness.kind, module.linearize({"q1": 0.5}).steadiness.kind

@@ -82,7 +82,7 @@ class PeriodicMotion:
 
     @property
     def stable(self) -> bool:
-        """Whether all disturbances but a shift along the motion die out, beyond the error of the multipliers.
+        """Stability: whether all disturbances but a shift along the motion die out, beyond the error of the multipliers.
 
         Multipliers that fall together with that of the shift, as where motions of all amplitudes are periodic, are known to the
         square root of the error only; their product is known as well as a single one.

@@ -28,7 +28,7 @@ ON_A, ON_B = (Point, Sphere, Disc, Torus, Cylinder, Box), (Plane, Sphere, Bore, 
 
 
 class Contact:
-    """Where two bodies may touch: one-sided, with dry friction and impacts.
+    """A contact where two bodies may touch: one-sided, with dry friction and impacts.
 
     name          of the contact; events, parameters and results are named after it
     a             the body that carries the shape; b: the body that it touches, which may be the ground

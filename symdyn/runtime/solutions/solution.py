@@ -424,7 +424,7 @@ class Solution:
 
     @property
     def has_work(self) -> bool:
-        """Whether the work of the loads was integrated along with the motion.
+        """Test of whether the work of the loads was integrated along with the motion.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> solution.has_work
