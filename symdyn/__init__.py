@@ -4,10 +4,9 @@ The public names; each is imported when it is first used, so that `import symdyn
 Examples begin with `import symdyn as sd`, `import numpy as np`, `import sympy as sp`.
 """
 
-from __future__ import annotations
-
-import importlib
-from typing import Any
+# Editors offer what stands here without an underscore.
+import importlib as _importlib
+from typing import Any as _Any
 
 __version__ = "0.1.0"
 
@@ -65,13 +64,13 @@ _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "
 __all__ = [*_WHERE, *_PACKAGES, "t"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> _Any:
     if name == "t":
-        return importlib.import_module("symdyn.model.symbols").time
+        return _importlib.import_module("symdyn.model.symbols").time
     if name in _PACKAGES:
-        return importlib.import_module(_PACKAGES[name])
+        return _importlib.import_module(_PACKAGES[name])
     if name in _WHERE:
-        return getattr(importlib.import_module(_WHERE[name]), name)
+        return getattr(_importlib.import_module(_WHERE[name]), name)
     raise AttributeError(f"symdyn has no {name!r}; it has {', '.join(sorted(__all__))}")
 
 

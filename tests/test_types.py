@@ -128,6 +128,13 @@ def test_an_editor_completes_names(jedi: ModuleType, after: str, names: set[str]
     assert names <= offered, names - offered
 
 
+def test_an_editor_offers_public_names_and_folders_of_the_package_alone(jedi: ModuleType) -> None:
+    """Files and folders of a package are offered by editors in any case."""
+    offered = {c.name for c in jedi.Script("import symdyn as sd\nsd.").complete(2, 3) if not c.name.startswith("_")}
+    inside = {path.name.removesuffix(".py") for path in STUB.parent.iterdir()}
+    assert set(sd.__all__) <= offered and offered - inside <= set(sd.__all__)
+
+
 def test_an_editor_shows_signatures_with_defaults(jedi: ModuleType) -> None:
     text = USER + "module.simulate("
     lines = text.split("\n")
