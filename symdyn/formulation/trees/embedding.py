@@ -16,11 +16,22 @@ from symdyn.model.record import Model
 
 
 class EmbeddedEquations(MotionEquations):
-    """M_tilde u_dot + k_tilde = F_tilde with u_dot from the factorized mass matrix."""
+    """M_tilde u_dot + k_tilde = F_tilde with u_dot from the factorized mass matrix.
+
+    >>> sd.systems.pendulum().embedding().M_tilde
+    Matrix([[l**2*m]])
+    """
 
     @property
     def F_c(self) -> sp.Matrix:
-        """Constraint reaction M r_ddot - F in the coordinates of the position map (level 1 only)."""
+        """Constraint reaction M r_ddot - F in the coordinates of the position map of `sd.embedding`.
+
+        >>> x, m, g, h = sd.coordinates("x"), *sd.parameters("m g h")
+        >>> sd.embedding([x], [x, h], [m, m], [0, -m * g]).F_c
+        Matrix([
+        [  0],
+        [g*m]])
+        """
         return self.explicit("F_c")
 
 

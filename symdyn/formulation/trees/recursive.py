@@ -32,29 +32,50 @@ class RecursiveEquations(MotionEquations):
     """tau by Newton-Euler, u_dot by articulated bodies; M_tilde by composite bodies where it is requested.
 
     links   names of the links, parents first; `link` gives what the lecture's pages name of one
+
+    >>> sd.systems.double_pendulum().recursive().links
+    ('rod1', 'rod2')
     """
 
     links: tuple[str, ...] = ()
 
     @property
     def tau(self) -> sp.Matrix:
-        """(n_u, 1) forces along the speeds that given accelerations need: M_tilde u_dot + k_tilde - F_tilde."""
+        """(n_u, 1) forces along the speeds that given accelerations need: M_tilde u_dot + k_tilde - F_tilde.
+
+        >>> sd.systems.pendulum().recursive().tau
+        Matrix([[l*m*(g*sin(q1) + l*q1_ddot)]])
+        """
         return self.explicit("inverse_dynamics")
 
     @property
     def coriolis(self) -> sp.Matrix:
-        """(n_u, n_u) C with C u = k_tilde and M_tilde_dot - 2 C skew-symmetric."""
+        """(n_u, n_u) C with C u = k_tilde and M_tilde_dot - 2 C skew-symmetric.
+
+        >>> equations = sd.systems.double_pendulum().recursive()
+        >>> sp.simplify(equations.coriolis * sp.Matrix(equations.symbols.speeds) - equations.k_tilde)
+        Matrix([
+        [0],
+        [0]])
+        """
         return self.explicit("coriolis")
 
     @property
     def gravity_load(self) -> sp.Matrix:
-        """(n_u, 1) forces along the speeds that hold the weights."""
+        """(n_u, 1) forces along the speeds that hold the weights.
+
+        >>> sd.systems.pendulum().recursive().gravity_load
+        Matrix([[g*l*m*sin(q1)]])
+        """
         return self.explicit("gravity_load")
 
     def link(self, which: Body | str | int) -> LinkPage:
         """Quantities of one link on the lecture's pages: the body that a joint moves, its name, or its number from 1.
 
         Raises SymdynError for a link that is not there.
+
+        >>> sd.systems.pendulum().recursive().link("bob").v.T
+        Matrix([[0, 0, q1_dot, 0, 0, 0]])
         """
         name = which.name if isinstance(which, Body) else which
         number = name if isinstance(name, int) else self.links.index(name) + 1 if name in self.links else 0
