@@ -11,6 +11,7 @@ import sympy as sp
 
 from symdyn.analytic.lagrange import momentum_leaves
 from symdyn.exact.dimensions import NAMED, Dimension, Dimensions, parsed, product, text, written
+from symdyn.formulation.names import outputs_in
 from symdyn.tape.node import ACCELERATION, Node
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def check_units(equations: Equations) -> UnitReport:
     printed = equations.printed_leaves()
     speeds = [units.get(u) for u in s.speeds]
     quantities: dict[str, np.ndarray] = {}
-    for name in (*CHECKED, *[n for n in equations.quantities if n.startswith("output_")]):
+    for name in (*CHECKED, *outputs_in(equations.quantities)):
         if name in equations.quantities or (name in ("T", "V") and "energy" in equations.quantities):
             quantities[name] = equations.quantity(name)
     rates = equations.quantity("balance")[len(s.speeds) + len(equations.constraints):][:len(s.states)]

@@ -13,6 +13,7 @@ import sympy as sp
 from symdyn.formulation.adjoint import Adjoint
 from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.linearization import Varied
+from symdyn.formulation.names import along_group
 from symdyn.formulation.sensitivities import Sensitive
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.model.symbols import time
@@ -62,7 +63,7 @@ class Motion:
             "jacobian_x": lambda: self.jacobian(self.x()),
             "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
             "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters)),
-            "unknowns": self.unknowns, **{f"unknowns_along_{group}": partial(self.along, group) for group in self.groups()}}
+            "unknowns": self.unknowns, **{along_group("unknowns", group): partial(self.along, group) for group in self.groups()}}
         shared = ("M_tilde", "bias", "accelerations")
         return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
                 **Varied(self).quantities(), **Adjoint(self).quantities(), **Sensitive(self).quantities()}

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import SymdynError
+from symdyn.formulation.names import ADJOINT, along_group
 from symdyn.spatial.vectors import inner, vector
 from symdyn.tape.differentiate import direction, forward, reverse
 from symdyn.tape.node import ACCELERATION, SEED, Node
@@ -42,7 +43,7 @@ class Adjoint:
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
-        return {"adjoint": self.gradient, **{f"adjoint_along_{group}": partial(self.along, group) for group in GROUPS}}
+        return {ADJOINT: self.gradient, **{along_group(ADJOINT, group): partial(self.along, group) for group in GROUPS}}
 
     def gradient(self) -> np.ndarray:
         """Gradient of w^T x_dot by q, u, z, inputs, parameters and t, one after the other."""

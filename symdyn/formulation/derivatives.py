@@ -1,7 +1,7 @@
 """Derivatives of any quantity: along a direction in one group of arguments, and by all entries of a group.
 
 Accelerations and multipliers in a quantity are differentiated through what they are solved from (`Motion.along`), not through
-the factorization. A function's name says what is differentiated and by what: lam_by_x, energy_by_params, inverse_dynamics_by_ud.
+the factorization. A function's name says what is differentiated and by what, see symdyn.formulation.names.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.names import ADJOINT, BY, HESSIAN, WEIGHTED, along_group, outputs_in
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import direction, forward, reverse, seed_name
@@ -20,20 +21,8 @@ from symdyn.tape.node import ACCELERATION, Node
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable, unsigned
 
-# Names of what functions are differentiated by -> the groups of arguments with this name.
-BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
-# Names of what a weighted sum of the rates is differentiated by, once or twice.
-WEIGHTED = ("x", "inputs", "params", "t")
-# Other quantities that are weighted and differentiated twice.
-CURVED = ("constraints", "outputs")
 # The quantity whose entries the equations are solved for.
 UNKNOWNS = "unknowns"
-
-
-def derivative_named(name: str) -> tuple[str, str] | None:
-    """The quantity that a function of this name differentiates, and the variables; None for other functions."""
-    of, _, by = name.rpartition("_by_")
-    return (of, by) if of and by in BY else None
 
 
 def names_of(equations: Equations, group: str) -> list[str]:
@@ -62,7 +51,7 @@ def along(equations: Equations, entries: Sequence[Any], group: str, unknowns: st
         values = equations.quantity(unknowns).tolist()
         used = _used(entries, values)
         if used:
-            changes = equations.quantity(f"{unknowns}_along_{group}").tolist()
+            changes = equations.quantity(along_group(unknowns, group)).tolist()
             seeds |= {unsigned(v): -d if v.op == "neg" else d for v, d in zip(values, changes, strict=True)
                       if isinstance(v, Node)}
     return forward(equations.recorder, entries, seeds)
@@ -90,26 +79,16 @@ def derivative(equations: Equations, values: np.ndarray, by: str) -> np.ndarray:
 def gradient(equations: Equations, wrt: Sequence[str], along: str | None = None) -> list[Any]:
     """The gradient of w^T x_dot by these of x, inputs, params and t, one after the other; along: its derivative along a direction
     in a group of arguments."""
-    whole = iter(equations.quantity("adjoint" if along is None else f"adjoint_along_{along}").tolist())
+    whole = iter(equations.quantity(ADJOINT if along is None else along_group(ADJOINT, along)).tolist())
     pieces = {by: [next(whole) for group in BY[by] for _ in leaves_of(equations, group)] for by in WEIGHTED}
     return [entry for by in wrt for entry in pieces[by]]
 
 
-def second_named(name: str) -> tuple[str, tuple[str, ...]] | None:
-    """Kind of a function of weighted rates, and the groups by which it differentiates: adjoint_x, hessian_x_inputs,
-    hessian_product_x."""
-    for kind in ("hessian_product", "hessian", "adjoint"):
-        wrt = tuple(name.removeprefix(f"{kind}_").split("_"))
-        if name.startswith(f"{kind}_") and wrt == tuple(by for by in WEIGHTED if by in wrt):
-            return kind, wrt
-    return None
-
-
 def weighted(equations: Equations, kind: str, wrt: Sequence[str]) -> np.ndarray:
     """The gradient of w^T x_dot, its matrix of second derivatives, or the product of this and a direction."""
-    if kind == "adjoint":
+    if kind == ADJOINT:
         return vector(*gradient(equations, wrt))
-    return hessian(equations, wrt) if kind == "hessian" else hessian_product(equations, wrt)
+    return hessian(equations, wrt) if kind == HESSIAN else hessian_product(equations, wrt)
 
 
 def hessian_product(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
@@ -139,19 +118,11 @@ def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
     return np.array(columns, dtype=object).T.reshape(len(columns), len(columns))
 
 
-def curvature_named(name: str) -> tuple[str, tuple[str, ...]] | None:
-    """Weighted quantity that a function of this name differentiates twice, and the groups by which it does:
-    constraints_hessian_x_params, outputs_hessian_x_inputs; None for other functions."""
-    of, result, by = name.partition("_hessian_")
-    wrt = tuple(by.split("_"))
-    return (of, wrt) if result and of in CURVED and wrt == tuple(one for one in WEIGHTED if one in wrt) else None
-
-
 def curved(equations: Equations, of: str) -> list[Any]:
     """The entries of what is differentiated twice: of the constraints [C; C_dot], of all outputs one after the other."""
     if of == "constraints":
         return [*equations.quantity("C").tolist(), *equations.quantity("C_dot").tolist()]
-    return [e for name in equations.quantities if name.startswith("output_") for e in equations.quantity(name).ravel().tolist()]
+    return [e for name in outputs_in(equations.quantities) for e in equations.quantity(name).ravel().tolist()]
 
 
 def curvature(equations: Equations, of: str, wrt: Sequence[str]) -> np.ndarray:

@@ -13,6 +13,7 @@ from symdyn.collector import collector_paused
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.facade import EquationsFacade
+from symdyn.formulation.names import output_quantity
 from symdyn.kinds import flag, text
 from symdyn.shown import shown
 from symdyn.tape.node import ACCELERATION, Node
@@ -147,8 +148,8 @@ class Equations(EquationsFacade):
         (1, 1)
         """
         text(name, "the name of a quantity", "M_tilde")
-        if name not in self.quantities and f"output_{name}" in self.quantities:
-            name = f"output_{name}"
+        if name not in self.quantities and output_quantity(name) in self.quantities:
+            name = output_quantity(name)
         if name not in self._recorded and name not in self.quantities:
             from symdyn.analytic.lagrange import QUANTITIES, recorded
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
+from symdyn.formulation.names import outputs_in
 from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
@@ -89,8 +90,7 @@ class Varied:
         """The user's outputs, one after the other, at given accelerations."""
         recorded = self.motion.quantities()
         with self.motion.accelerations_given():
-            values = [np.asarray(record(), dtype=object).ravel() for name, record in recorded.items()
-                      if name.startswith("output_")]
+            values = [np.asarray(recorded[name](), dtype=object).ravel() for name in outputs_in(recorded)]
         return np.concatenate(values) if values else vector()
 
     def variation(self) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import given_by_time
 from symdyn.formulation.linearization import DIRECTION
+from symdyn.formulation.names import outputs_in, rate_of, variation_of
 from symdyn.spatial.vectors import vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
@@ -70,7 +71,7 @@ class Sensitive:
             "corrected_variation": self.corrected_variation, "outputs_sensitivity": self.outputs_sensitivity}
         for name in ("events", "event_resets"):
             if hasattr(self.motion, name):
-                recorded |= {f"{name}_rate": partial(self._by_time, name), f"{name}_variation": partial(self._of, name)}
+                recorded |= {rate_of(name): partial(self._by_time, name), variation_of(name): partial(self._of, name)}
         return recorded
 
     def direction(self) -> dict[Any, Any]:
@@ -143,8 +144,8 @@ class Sensitive:
 
     def outputs_sensitivity(self) -> np.ndarray:
         """See above."""
-        values = [np.asarray(record(), dtype=object).ravel() for name, record in self.motion.quantities().items()
-                  if name.startswith("output_")]
+        recorded = self.motion.quantities()
+        values = [np.asarray(recorded[name](), dtype=object).ravel() for name in outputs_in(recorded)]
         return self._along(np.concatenate(values) if values else vector())
 
     def _of(self, name: str) -> np.ndarray:

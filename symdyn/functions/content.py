@@ -23,9 +23,9 @@ from symdyn.backend.packed import NAME as PACKED
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
-from symdyn.formulation.derivatives import second_named
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
+from symdyn.formulation.names import outputs_in, second_named
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.packed import band
 from symdyn.functions.sensitivities import column_names, held_names
@@ -127,8 +127,7 @@ def _ranges(ranges: Iterable[Range]) -> tuple[tuple[str, str, float, bool, float
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:
     """Names and shapes of the user's outputs."""
-    return tuple((q.removeprefix("output_"), tuple(equations.quantity(q).shape))
-                 for q in equations.quantities if q.startswith("output_"))
+    return tuple((name, tuple(equations.quantity(q).shape)) for q, name in outputs_in(equations.quantities).items())
 
 
 def event_records(equations: Equations) -> tuple[EventRecord, ...]:

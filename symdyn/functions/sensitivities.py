@@ -14,6 +14,7 @@ import numpy as np
 from symdyn.backend.columns import Group, MotionColumns
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
+from symdyn.formulation.names import rate_of, variation_of
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import reverse, seed_name
@@ -84,7 +85,7 @@ def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held:
         return _tape(equations, name, np.concatenate([_with(equations, "carried_variation", column, then)
                                                       for column, then in zip(columns, later, strict=True)]))
     of = "events" if name == OF_EVENTS else "event_resets"
-    parts = [equations.quantity(f"{of}_rate"), *[_with(equations, f"{of}_variation", column) for column in columns]]
+    parts = [equations.quantity(rate_of(of)), *[_with(equations, variation_of(of), column) for column in columns]]
     return _tape(equations, name, np.array(parts, dtype=object).T)
 
 

@@ -12,23 +12,22 @@ from symdyn.backend.packed import NAME as PACKED
 from symdyn.backend.right_side import RightSide
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.constraints.motion import residual_names
-from symdyn.formulation.derivatives import (
-    BY,
-    UNKNOWNS,
-    along,
-    curvature,
-    curvature_named,
-    curved,
-    derivative,
-    derivative_named,
-    gradient,
-    second_named,
-    seeds_in,
-    weighted,
-)
+from symdyn.formulation.derivatives import UNKNOWNS, along, curvature, curved, derivative, gradient, seeds_in, weighted
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
+from symdyn.formulation.names import (
+    ADJOINT,
+    BY,
+    HESSIAN,
+    HESSIAN_PRODUCT,
+    curvature_named,
+    derivative_named,
+    differentiated,
+    outputs_in,
+    second_named,
+    stabilized,
+)
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
 from symdyn.functions import sensitivities as columns
 from symdyn.functions.packed import packed_tape, pattern
@@ -41,15 +40,15 @@ from symdyn.tape.tape import Output, Tape
 def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
     if second_named(name) is not None:
-        return "adjoint" in equations.quantities
+        return ADJOINT in equations.quantities
     twice = curvature_named(name)
     if twice is not None:
-        return "C_dot" in equations.quantities if twice[0] == "constraints" else has_function(equations, "outputs")
+        return "C_dot" in equations.quantities if twice.of == "constraints" else has_function(equations, "outputs")
     result = derivative_named(name)
     if result is not None and name not in equations.quantities:
-        return result[0] in ALL and derivative_named(result[0]) is None and has_function(equations, result[0])
+        return result.of in ALL and derivative_named(result.of) is None and has_function(equations, result.of)
     if name == "outputs":
-        return any(q.startswith("output_") for q in equations.quantities)
+        return bool(outputs_in(equations.quantities))
     if name == "switches":
         return bool(switches(equations))
     if name in (BOUNDS, RANGES):
@@ -90,11 +89,11 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape(equations.recorder, {name: Output.of(name, curvature(equations, *twice))})
     result = derivative_named(name)
     if result is not None and name not in equations.quantities:
-        differentiated = _only_output(tape_as_derived(equations, result[0])).array()
-        return Tape.of(equations.recorder, **{name: derivative(equations, differentiated, result[1])})
+        values = _only_output(tape_as_derived(equations, result.of)).array()
+        return Tape.of(equations.recorder, **{name: derivative(equations, values, result.by)})
     if name != "outputs":
         return equations.tape(quantity_of(name))
-    values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
+    values = [equations.quantity(q).ravel() for q in outputs_in(equations.quantities)]
     whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
     return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
 
@@ -109,12 +108,12 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
              columns.adjoint_tape_of(equations, name, adjoint) if name in columns.ADJOINTS else tape_as_derived(equations, name)
              for name in names}
     if work or baumgarte:
-        field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
+        field = equations.quantity(stabilized("rhs") if baumgarte else "rhs")
         if work:
             field = np.concatenate([field, equations.quantity("power").reshape(1)])
         tapes["rhs"] = Tape.of(equations.recorder, rhs=field)
     if (work or baumgarte) and "jacobian_x" in names:
-        by_x = equations.quantity("jacobian_x_baumgarte" if baumgarte else "jacobian_x")
+        by_x = equations.quantity(stabilized("jacobian_x") if baumgarte else "jacobian_x")
         if work:  # nothing depends on the work
             by_x = np.vstack([by_x, equations.quantity("power_x").reshape(1, -1)])
             by_x = np.column_stack([by_x, np.zeros(len(by_x), dtype=object)])
@@ -138,14 +137,14 @@ def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Co
     if name == "rhs" and right_side.sensitivities:
         return columns.motion_columns(equations, right_side.sensitivities, right_side.held) if right_side.in_lanes else None
     second = second_named(name)
-    if second is not None and second[0] == "hessian":
-        return _columns_of_hessian(equations, name, second[1])
-    result = _JACOBIANS.get(name) or derivative_named(name)
+    if second is not None and second.kind == HESSIAN:
+        return _columns_of_hessian(equations, name, second.wrt)
+    result = differentiated(name)
     if result is None or second is not None:
         return None
     of, by = result
-    stabilized = right_side.baumgarte and name == "jacobian_x"
-    values = equations.quantity("rhs_baumgarte") if stabilized else _only_output(tape_as_derived(equations, of)).array()
+    by_gain = right_side.baumgarte and name == "jacobian_x"
+    values = equations.quantity(stabilized("rhs")) if by_gain else _only_output(tape_as_derived(equations, of)).array()
     entries = values.ravel().tolist()
     work = right_side.work and name == "jacobian_x"
     if work:
@@ -157,7 +156,7 @@ def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Co
         seeds = seeds_in(equations, group)
         if seeds:
             groups.append(Group(group, seeds, n))
-            changes += along(equations, entries, group, "unknowns_baumgarte" if stabilized else UNKNOWNS)
+            changes += along(equations, entries, group, stabilized(UNKNOWNS) if by_gain else UNKNOWNS)
             n += len(seeds)
     if not groups or not entries:
         return None
@@ -181,9 +180,6 @@ def _columns_of_hessian(equations: Equations, name: str, wrt: Sequence[str]) -> 
 
 def _only_output(tape: Tape) -> Output:
     return next(iter(tape.outputs.values()))
-
-
-_JACOBIANS = {f"jacobian_{by}": ("rhs", by) for by in ("x", "inputs", "params")}
 
 
 def given_rates(equations: Equations, names: Sequence[str], sensitivities: Sequence[str] = ()) -> list[str]:
@@ -210,10 +206,10 @@ def given_rates(equations: Equations, names: Sequence[str], sensitivities: Seque
         given += multiplier_names(n_c)
     if any(second_named(n) for n in names):
         given += weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
-        wrt = next((second[1] for n in names if (second := second_named(n)) and second[0] == "hessian_product"), ())
+        wrt = next((second.wrt for n in names if (second := second_named(n)) and second.kind == HESSIAN_PRODUCT), ())
         given += [seed for by in wrt for group in BY[by] for seed in seeds_in(equations, group)]
     for twice in filter(None, map(curvature_named, names)):
-        given += weight_names(len(curved(equations, twice[0])))
+        given += weight_names(len(curved(equations, twice.of)))
     if any(n in VARIATIONS for n in names):
         given += variation_names(symbols, n_c, "second_variation" in names)
     return given

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from symdyn.errors import EvaluationError
+from symdyn.formulation.names import HESSIAN, Weighted, derivative_of
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -69,14 +70,14 @@ class Arguments:
 class Groups:
     """Derivatives of a module's functions by groups of arguments, as those by [x; inputs; free parameters; t].
 
-    sizes   by group that is there: its entries; whole: of all; name: of the groups in functions' names
+    sizes   by group that is there: its entries; whole: of all
     kept    which of them are arguments; corner: indices of these in a matrix (n, n)
     """
 
     def __init__(self, of: Arguments, n_p: int, groups: Sequence[str], n: int | None = None) -> None:
         every = {"x": of.n_x, "inputs": of.n_in, "params": n_p if of.free else 0, "t": 1}
         self.sizes = {by: every[by] for by in groups if every[by]}
-        self.whole, self.name, self.n = sum(self.sizes.values()), "_".join(self.sizes), of.n if n is None else n
+        self.whole, self.n = sum(self.sizes.values()), of.n if n is None else n
         before = sum(self.sizes.get(by, 0) for by in ("x", "inputs"))
         last = (self.whole - 1,) if "t" in self.sizes else ()
         self.kept = np.array([*range(before), *(before + k for k in of.free), *last], dtype=int)
@@ -101,8 +102,8 @@ class Dynamics:
         self.module, self.of, self.p = module, arguments, p.copy()
         self.calls = 0
         self._by = Groups(arguments, len(p), ("x", "inputs", "params", *(("t",) if timed else ())))
-        self._first = {by: "rhs_by_t" if by == "t" else f"jacobian_{by}" for by in self._by.sizes}
-        self._second = f"hessian_{self._by.name}"
+        self._first = {by: derivative_of("rhs", by) for by in self._by.sizes}
+        self._second = Weighted(HESSIAN, tuple(self._by.sizes)).name
         n, whole = arguments.n, self._by.whole
         blocks = [structure_of(module, name, (arguments.n_x, self._by.sizes[by])) for by, name in self._first.items()]
         self.slopes = self._by.columns(np.hstack(blocks))

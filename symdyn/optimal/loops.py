@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from symdyn.errors import EvaluationError, SymdynError
+from symdyn.formulation.names import Curvature, derivative_of
 from symdyn.optimal.field import Arguments, Groups
 from symdyn.tape.intrinsics import RANK
 
@@ -43,15 +44,16 @@ class Loops:
         return np.hstack([self._call(name, at, (self.n_c,)) for name in ("C", "C_dot")])[:, self.rows]
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        result = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, size)) for by, size in self._by.sizes.items()],
-                                 axis=2) for name in ("C", "C_dot")]
+        sizes = self._by.sizes.items()
+        result = [np.concatenate([self._call(derivative_of(name, by), at, (self.n_c, size)) for by, size in sizes], axis=2)
+                  for name in ("C", "C_dot")]
         return self._by.columns(np.concatenate(result, axis=1)[:, self.rows])
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         whole = np.zeros((len(at), 2 * self.n_c))
         whole[:, self.rows] = weights
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), whole])
-        second = self._call(f"constraints_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
+        second = self._call(Curvature("constraints", tuple(self._by.sizes)).name, at, (self._by.whole, self._by.whole), given)
         result = np.zeros((len(at), self._by.n, self._by.n))
         result[:, *self._by.corner] = second[:, self._by.kept[:, None], self._by.kept]
         return result

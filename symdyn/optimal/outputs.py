@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import EvaluationError
+from symdyn.formulation.names import Curvature, derivative_of
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments, Groups, structure_of
 from symdyn.runtime.losses import output_names
@@ -33,7 +34,7 @@ class WithOutputs:
         self.m, self.slopes = expressions.m, expressions.slopes[:, :self.n].copy()
         self.curvature = expressions.curvature[:self.n, :self.n].copy()
         of_outputs = np.zeros((self.n_y, self.n), dtype=bool)
-        parts = [structure_of(module, f"outputs_by_{by}", (self.n_y, size)) for by, size in self._by.sizes.items()]
+        parts = [structure_of(module, derivative_of("outputs", by), (self.n_y, size)) for by, size in self._by.sizes.items()]
         of_outputs[:, self._at] = self._by.columns(np.hstack(parts))
         self.slopes |= expressions.slopes[:, self.n:] @ of_outputs
         used = of_outputs[expressions.slopes[:, self.n:].any(axis=0)].any(axis=0)
@@ -54,7 +55,7 @@ class WithOutputs:
         cross = H[:, :self.n, self.n:] @ Y
         result = H[:, :self.n, :self.n] + cross + cross.transpose(0, 2, 1) + Y.transpose(0, 2, 1) @ H[:, self.n:, self.n:] @ Y
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), on_outputs])
-        second = self._call(f"outputs_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
+        second = self._call(Curvature("outputs", tuple(self._by.sizes)).name, at, (self._by.whole, self._by.whole), given)
         result[:, self._at, self._at][:, *self._by.corner] += second[:, self._by.kept[:, None], self._by.kept]
         return np.asarray(result)
 
@@ -64,7 +65,7 @@ class WithOutputs:
     def _slopes(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the outputs by the arguments, (N, n_y, n); by the time where it is not prescribed."""
         result = np.zeros((len(at), self.n_y, self.n))
-        parts = [self._call(f"outputs_by_{by}", at, (self.n_y, size)) for by, size in self._by.sizes.items()]
+        parts = [self._call(derivative_of("outputs", by), at, (self.n_y, size)) for by, size in self._by.sizes.items()]
         result[:, :, self._at] = self._by.columns(np.concatenate(parts, axis=2))
         return result
 

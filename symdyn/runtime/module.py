@@ -18,6 +18,7 @@ from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.formulation.names import ADJOINT, HESSIAN, HESSIAN_PRODUCT, WEIGHTED, Weighted, derivative_of
 from symdyn.kinds import text
 from symdyn.pages import table, titled
 from symdyn.real_numbers import DOUBLE, number_of, real_of
@@ -102,8 +103,6 @@ def _jacobian(parts: Mapping[str, np.ndarray]) -> Jacobian[np.ndarray | None]:
 
 
 _BY = "x, inputs, params, t and ud"
-# Quantities by which weighted sums of rates are differentiated, once or twice.
-_WEIGHTED = ("x", "inputs", "params", "t")
 
 
 class Module:
@@ -513,7 +512,7 @@ class Module:
         """
         self._weighted(wrt, "adjoint")
         given = self._with_weights(weights, (), 0)
-        result = {w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt}
+        result = {w: self.evaluate(Weighted(ADJOINT, (w,)).name, t, x, params, inputs, given) for w in wrt}
         return FurtherDerivatives(**result) if "t" in wrt else _jacobian(result)
 
     def hessian(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
@@ -534,21 +533,21 @@ class Module:
         array([19.62,  0.  ])
         """
         self._weighted(wrt, "hessian")
-        chosen = [by for by in _WEIGHTED if by in wrt]
+        chosen = tuple(by for by in WEIGHTED if by in wrt)
         sizes = self.metadata.sizes
         n = sum({"x": sizes.x, "inputs": sizes.inputs, "params": sizes.p, "t": 1}[by] for by in chosen)
-        kind = "hessian" if along is None else "hessian_product"
+        kind = HESSIAN if along is None else HESSIAN_PRODUCT
         given = self._with_weights(weights, () if along is None else along, 0 if along is None else n)
-        return self.evaluate(f"{kind}_{'_'.join(chosen)}", t, x, params, inputs, given)
+        return self.evaluate(Weighted(kind, chosen).name, t, x, params, inputs, given)
 
     def _weighted(self, wrt: Any, what: str) -> None:
         """Raise ArgumentError for what the weighted rates are not differentiated by."""
         if not isinstance(wrt, (list, tuple)) or not wrt:
-            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of {', '.join(_WEIGHTED)}")
-        unknown = [w for w in wrt if not isinstance(w, str) or w not in _WEIGHTED]
+            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of {', '.join(WEIGHTED)}")
+        unknown = [w for w in wrt if not isinstance(w, str) or w not in WEIGHTED]
         if unknown:
             raise ArgumentError(f"{self.name}: {what} by {', '.join(map(name_of, unknown))} asked for; there are "
-                                f"{', '.join(_WEIGHTED)}")
+                                f"{', '.join(WEIGHTED)}")
 
     def _with_weights(self, weights: Any, along: Any, n: int) -> np.ndarray:
         """Arguments of weighted functions in place of accelerations: zeros for these, weights, a direction."""
@@ -623,8 +622,7 @@ class Module:
         """Quantities by which a function is differentiated -> the name of the derivative's function."""
         text(of, f"{self.name}: the name of the function to differentiate", "inverse_dynamics")
         self._library(of)
-        own = {f"{by}": f"jacobian_{by}" for by in ("x", "inputs", "params") if of == "rhs"}
-        return {by: own.get(by, f"{of}_by_{by}") for by in FurtherDerivatives._fields}
+        return {by: derivative_of(of, by) for by in FurtherDerivatives._fields}
 
     def function(self, name: str) -> Callable[..., np.ndarray]:
         """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states.

@@ -8,6 +8,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from symdyn.formulation.names import outputs_in
 from symdyn.functions.tapes import function_tape, tape_as_derived
 from symdyn.precision.program import Lost, program
 from symdyn.stress.system_under_test import EPS, SystemUnderTest
@@ -207,7 +208,7 @@ def together(tested: SystemUnderTest, name: str, size: int) -> np.ndarray:
     elif name == "mass_matrix":
         labels = [(a, b) for a in of_speeds for b in of_speeds]
     elif name == "outputs":
-        labels = [k for k, q in enumerate(q for q in tested.equations.quantities if q.startswith("output_"))
+        labels = [k for k, q in enumerate(outputs_in(tested.equations.quantities))
                   for _ in tested.equations.quantity(q).ravel()]
     elif name == "frames":
         labels = [k % 12 < 3 for k in range(size)]

@@ -25,6 +25,7 @@ from symdyn.collector import collector_paused
 from symdyn.errors import ArgumentError, CompileError, CompilerWarning
 from symdyn.folders import templates_folder
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.names import derivative_of
 from symdyn.functions import groups
 from symdyn.functions.content import content_of
 from symdyn.functions.tapes import all_columns_of, has_function
@@ -96,7 +97,7 @@ def source_of(equations: Equations, specialize: Mapping[Any, float] | None) -> t
         names = [n for n in groups.of_right_side(whole, RightSide()) if n not in ("validity_checks", "switches")]
         names += [n for n in ("outputs", "energy") if has_function(whole, n)]
         by = {"x": True, "inputs": bool(whole.symbols.inputs), "params": len(whole.symbols.parameters) > 0 and not bound}
-        matrices = [("jacobian_" if of == "rhs" else f"{of}_by_") + to for of in ("rhs", "outputs", "energy") if of in names
+        matrices = [derivative_of(of, to) for of in ("rhs", "outputs", "energy") if of in names
                     for to, there in by.items() if there]
         wanted = [(of, to) for of in ("rhs", "outputs", "energy") if of in names for to, there in by.items() if there]
         if not all(differentiable(whole, of, to) for of, to in wanted):
@@ -183,7 +184,7 @@ def _wrapped(of_code: Any, metadata: ModuleMetadata, n_outputs: int, derivatives
     for by, n in (("x", n_x), ("inputs", len(metadata.inputs)), ("params", len(metadata.parameters))):
         calls, first = [], 0
         for of, size in (("rhs", n_x), *sizes.items()):
-            name = f"jacobian_{by}" if of == "rhs" else f"{of}_by_{by}"
+            name = derivative_of(of, by)
             if name in derivatives:
                 calls.append(call(name, first))
             first += size * n

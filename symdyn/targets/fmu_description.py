@@ -16,6 +16,7 @@ import numpy as np
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.errors import ArgumentError
 from symdyn.exact.dimensions import BASE, parsed
+from symdyn.formulation.names import derivative_of
 
 # Angles count as 1 in units; the standard has a base unit for them.
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "rev": 2 * math.pi}
@@ -187,7 +188,7 @@ def unknowns_of(metadata: ModuleMetadata, at: References, structure: Callable[[s
     first = at.outputs
     for name in ("outputs", "energy"):
         if name in arguments:
-            result = rows(name, {group: f"{name}_by_{group}" for group in ("x", "inputs")}, first)
+            result = rows(name, {group: derivative_of(name, group) for group in ("x", "inputs")}, first)
             outputs += result
             first += len(result)
     return outputs, rows("rhs", {"x": "jacobian_x", "inputs": "jacobian_inputs"}, at.rates)

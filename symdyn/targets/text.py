@@ -14,8 +14,8 @@ from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source, render
 from symdyn.collector import collector_paused
 from symdyn.errors import UnsupportedExpression
-from symdyn.formulation.derivatives import BY, derivative_named
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.names import BY, Derivative, derivative_named
 from symdyn.functions import groups
 from symdyn.functions.content import content_of
 from symdyn.functions.tapes import all_columns_of, has_function
@@ -35,7 +35,7 @@ def source_for(equations: Equations, target: str, names: Sequence[str] | None = 
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     functions = groups.written(equations, names, None)
     with collector_paused():
-        derivatives = [f"{name}_by_{by}" for name in functions for by in BY if differentiable(equations, name, by)]
+        derivatives = [Derivative(name, by).name for name in functions for by in BY if differentiable(equations, name, by)]
         content = content_of(equations, [*functions, *derivatives], False, bound, RightSide(), all_columns_of)
         return render(content, DIALECT, standalone=False, right_side=RightSide(integrated=False), only=(TARGETS[target],))
 
@@ -43,7 +43,7 @@ def source_for(equations: Equations, target: str, names: Sequence[str] | None = 
 def differentiable(equations: Equations, name: str, by: str) -> bool:
     """Whether the derivatives of a function by a group of arguments are emitted with it: not where a function of the user has
     none."""
-    whole = f"{name}_by_{by}"
+    whole = Derivative(name, by).name
     try:
         return derivative_named(name) is None and has_function(equations, whole) and all_columns_of(
             equations, whole, RightSide()) is not None

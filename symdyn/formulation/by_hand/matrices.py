@@ -26,6 +26,7 @@ from symdyn.formulation.constraints.motion import Constrained
 from symdyn.formulation.constraints.rows import Row
 from symdyn.formulation.constraints.solver_choice import choose
 from symdyn.formulation.equations import Equations, Symbols
+from symdyn.formulation.names import output_quantity
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.formulation.probes.contradictions import contradictions
@@ -161,12 +162,12 @@ class _Matrices(Motion):
     def quantities(self) -> dict[str, Any]:
         given = self.recorded.given
         own: dict[str, Any] = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
-                               **{f"output_{name}": partial(self.output, name, e) for name, e in given.outputs}}
+                               **{output_quantity(name): partial(self.output, name, e) for name, e in given.outputs}}
         if given.homogeneous:
             own["kinetic_energy"] = self.kinetic_energy
         if given.energy is not None:
             own |= {"energy": self.energy, "power": self.power, "power_x": self.power_x}
-        own |= {f"output_{name}": partial(self.unknown, k) for k, name in enumerate(given.unknown)}
+        own |= {output_quantity(name): partial(self.unknown, k) for k, name in enumerate(given.unknown)}
         return {**super().quantities(), **own}
 
     def M_tilde(self) -> np.ndarray:

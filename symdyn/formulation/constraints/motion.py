@@ -17,6 +17,7 @@ from symdyn.formulation.accelerations import Implicit, Motion
 from symdyn.formulation.constraints.null_space import NullSpaceSolver
 from symdyn.formulation.constraints.rows import Row
 from symdyn.formulation.constraints.saddle import IntrinsicSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
+from symdyn.formulation.names import along_group, stabilized
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward
@@ -70,9 +71,9 @@ class Constrained(Motion):
             "F_d": self.F_d, "lam": self.lam, "matrix": self.matrix, "right_side": self.right_side,
             "C_scale": self.C_scale, "length": lambda: self.length,
             "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
-            "rhs_baumgarte": self.rhs_baumgarte, "jacobian_x_baumgarte": self.jacobian_x_baumgarte,
-            "unknowns_baumgarte": lambda: np.concatenate(self.recall("stabilized")),
-            **{f"unknowns_baumgarte_along_{group}": partial(self.along, group, True) for group in self.groups()},
+            stabilized("rhs"): self.rhs_baumgarte, stabilized("jacobian_x"): self.jacobian_x_baumgarte,
+            stabilized("unknowns"): lambda: np.concatenate(self.recall("stabilized")),
+            **{along_group(stabilized("unknowns"), group): partial(self.along, group, True) for group in self.groups()},
             "residual": self.residual}
         return {**super().quantities(), **own}
 

@@ -11,6 +11,7 @@ import numpy as np
 from symdyn.errors import SymdynError
 from symdyn.formulation.algebra import accelerations_of
 from symdyn.formulation.loads.recorded import Applied, Loads
+from symdyn.formulation.names import OfLink
 from symdyn.formulation.textbook.bias import gravity_load
 from symdyn.formulation.textbook.center_frame import AtCenter, at_center
 from symdyn.formulation.textbook.coriolis import Coriolis, coriolis, given_motions
@@ -90,7 +91,7 @@ class Page:
         """name -> function that records it."""
         named: dict[str, Callable[[], Any]] = {}
         for k in range(len(self.tree.links)):
-            named |= {f"{name}_{k + 1}": record for name, record in self._of_link(k).items()}
+            named |= {OfLink(name, k + 1).name: record for name, record in self._of_link(k).items()}
         own: dict[str, Callable[[], Any]] = {
             "gravity_load": lambda: gravity_load(self.tree).load, "momentum": lambda: self.momenta.h_0,
             "momentum_G": lambda: self.momenta.h_G, "center_of_mass": lambda: self.momenta.center}

@@ -19,6 +19,7 @@ from symdyn.formulation.loads.contact_groups import spheres
 from symdyn.formulation.loads.contacts import ContactRows
 from symdyn.formulation.loads.implicit import Settled, solve
 from symdyn.formulation.loads.recorded import Loads
+from symdyn.formulation.names import output_quantity
 from symdyn.formulation.probes.inertia_faults import demand_mass_matrix
 from symdyn.formulation.trees import mass_matrix as composite
 from symdyn.formulation.trees.inertial_forces import inverse_dynamics
@@ -139,7 +140,7 @@ class TreeQuantities(Motion):
                "joint_points": self.joint_points, "joint_axes": self.joint_axes,
                "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
-               **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
+               **{output_quantity(o.name): partial(self.output, o.name, o.value) for o in self.model.outputs}}
         if self.connections:
             own["spring_points"] = self.spring_points
         if self.acting:

@@ -11,6 +11,7 @@ import sympy as sp
 
 from symdyn.errors import SymdynError
 from symdyn.formulation.accelerations import Solver
+from symdyn.formulation.names import OfLink, link_named
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.formulation.probes.inertia_faults import demand_pivots, joints_by_speed, massless
 from symdyn.formulation.textbook.page import Page
@@ -95,14 +96,14 @@ class LinkPage:
     number: int
 
     def __dir__(self) -> list[str]:
-        end = f"_{self.number}"
-        return sorted(n.removesuffix(end) for n in self.equations.quantities if n.endswith(end) and not n.startswith("output"))
+        there = filter(None, map(link_named, self.equations.quantities))
+        return sorted(one.letter for one in there if one.number == self.number)
 
     def __repr__(self) -> str:
         return f"<link {self.number} of {self.equations.name}: {', '.join(dir(self))}>"
 
     def __getattr__(self, name: str) -> sp.Matrix:
-        quantity = f"{name}_{self.number}"
+        quantity = OfLink(name, self.number).name
         if name.startswith("__") or quantity not in self.equations.quantities:
             reasons = "".join(f" ({note})" for note in self.equations.notes if note.startswith("no "))
             raise AttributeError(f"link {self.number} has no {name}; it has {', '.join(dir(self))}{reasons}")
