@@ -58,16 +58,16 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     result = {name: columns(equations, name, right_side) for name in names} if columns is not None else {}
     several = {name: made for name, made in result.items() if made is not None}
     one_by_one = tapes_of(equations, [n for n in names if n not in several], right_side)
-    tapes = {n: several[n].tape if n in several else one_by_one[n] for n in names}
+    regular = {n: several[n].tape if n in several else one_by_one[n] for n in names}
+    parts = list(regular.items())
     if equations.singular_fallback is not None:
         there = tapes_of(equations.singular_fallback, names, right_side)
-        differ = {n: t for n, t in there.items() if n in several or _entries(t) != _entries(tapes[n])}
-        tapes |= {f"{n} singular": t for n, t in differ.items()}
+        parts += [(n, t) for n, t in there.items() if n in several or _entries(t) != _entries(regular[n])]
     folded = {**bound, **(dict.fromkeys(closed_names(equations), 0.0) if right_side.open_contacts else {})}
     if folded:
-        tapes = _together(tapes, lambda whole: specialize(whole, folded))
-    tapes = _together(tapes, balance)
-    singular_fallback = {n: tapes.pop(f"{n} singular") for n in names if f"{n} singular" in tapes}
+        parts = _together(parts, lambda whole: specialize(whole, folded))
+    parts = _together(parts, balance)
+    tapes, singular_fallback = dict(parts[:len(regular)]), dict(parts[len(regular):])
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
                     *column_names(symbols, right_side.sensitivities)],
@@ -168,11 +168,11 @@ def _entries(tape: Tape) -> tuple[Any, ...]:
     return next(iter(tape.outputs.values())).entries
 
 
-def _together(tapes: Mapping[str, Tape], change: Callable[[Tape], Tape]) -> dict[str, Tape]:
-    """A pass over all functions' tapes as one, so that they still share their steps."""
-    recorder = next(iter(tapes.values())).recorder
-    whole = change(Tape(recorder, {n: next(iter(t.outputs.values())) for n, t in tapes.items()}))
-    return {n: whole.prune((n,)) for n in tapes}
+def _together(parts: Sequence[tuple[str, Tape]], change: Callable[[Tape], Tape]) -> list[tuple[str, Tape]]:
+    """A pass over all tapes as one, so that they still share their steps; a function has a second one where states are
+    singular."""
+    whole = change(Tape(parts[0][1].recorder, {str(k): next(iter(t.outputs.values())) for k, (_, t) in enumerate(parts)}))
+    return [(n, Tape(whole.recorder, {n: whole.outputs[str(k)]})) for k, (n, _) in enumerate(parts)]
 
 
 def _by_name(values: Any) -> dict[str, float]:
