@@ -153,10 +153,9 @@ def test_public_signatures_show_the_relative_tolerance_as_a_number() -> None:
 RETURNED = (Module, Solution, BatchSolution, Equations, MotionEquations, AugmentedEquations, Equilibrium, Equilibria,
             Linearization, Modes, Mode, Stability, Campbell, Regulator, Actuation, Ensemble, SystemFacade, EquationsFacade,
             MotionFacade)
-# Where no type says it: entries of SymPy or of nested lists; a matrix, or one with
-# intermediates; a comparison or several of them, by the text; what a scalar of a derivation may be; a client of dask, mpi4py
-# or concurrent.futures.
-UNTYPED = {"Case", "Formula", "compare", "explicit", "rate", "motion", "rates", "ensemble"}
+# Where no type says it: entries of SymPy or of nested lists; a comparison or several of them, by the text; what a scalar of a
+# derivation may be; a client of dask, mpi4py or concurrent.futures.
+UNTYPED = {"Case", "Formula", "compare", "rate", "motion", "rates", "ensemble"}
 
 
 def _signatures() -> Iterator[tuple[str, inspect.Signature]]:

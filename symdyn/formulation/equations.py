@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 import sympy as sp
@@ -25,9 +25,7 @@ from symdyn.tape.tape import Tape
 _UNREADABLE = 50_000
 
 if TYPE_CHECKING:
-
-
-    pass
+    from symdyn.report.named import Step
 
 
 def _derived_again(again: Callable[[], Equations], simplify_seconds: float, candidates: Sequence[Any]) -> Equations:
@@ -173,8 +171,16 @@ class Equations(EquationsFacade):
         """
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
+    @overload
+    def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: Literal[False] = False,
+                 on_constraints: bool = False) -> sp.Matrix | sp.Expr: ...
+
+    @overload
+    def explicit(self, name: str, simplify: bool = True, form: str = "shortest", *, intermediates: Literal[True],
+                 on_constraints: bool = False) -> tuple[sp.Matrix | sp.Expr, list[Step]]: ...
+
     def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: bool = False,
-                 on_constraints: bool = False) -> Any:
+                 on_constraints: bool = False) -> sp.Matrix | sp.Expr | tuple[sp.Matrix | sp.Expr, list[Step]]:
         """The quantity as explicit SymPy in its shortest form, by exact algebra (symdyn.exact).
 
         simplify   False: as it was derived, in any time that this takes
