@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import SymdynError
-from symdyn.formulation.names import ADJOINT, along_group
+from symdyn.formulation.names import ADJOINT, GROUPS, along_group
 from symdyn.spatial.vectors import inner, vector
 from symdyn.tape.differentiate import direction, forward, reverse
 from symdyn.tape.node import ACCELERATION, SEED, Node
@@ -29,9 +29,6 @@ from symdyn.tape.tape import reachable
 
 if TYPE_CHECKING:
     from symdyn.formulation.accelerations import Motion
-
-# The gradient's groups of arguments, in their order; along each of these the gradient has a derivative.
-GROUPS = ("q", "u", "z", "inputs", "p", "t")
 
 
 class Adjoint:

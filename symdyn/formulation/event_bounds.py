@@ -10,13 +10,13 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.names import BOUNDS, RANGES
 from symdyn.model.symbols import parts_of
 from symdyn.tape.external import Result, UserFunction
 from symdyn.tape.intervals import Interval, Jet, encloses, enclosures
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, Node
 from symdyn.tape.tape import Tape, reachable
 
-BOUNDS, RANGES = "event_bounds", "event_ranges"
 # Functions that can make no pulse far narrower than their argument's own changes.
 _EVEN = (sp.sin, sp.cos, sp.sinh, sp.cosh, sp.asinh, sp.log)
 # Bounds of a leaf in their order: value, derivative and second derivative by the place within the part, from and to.

@@ -18,6 +18,10 @@ ADJOINT, HESSIAN_PRODUCT, HESSIAN = "adjoint", "hessian_product", "hessian"
 LETTERS = ("X", "X_star", "S", "S_ring", "I", "v", "c", "p", "a", "f", "I_A", "p_A", "v_G", "a_G", "f_G")
 # Derivatives of x_dot, which have names of their own.
 JACOBIANS = {"x": "jacobian_x", "inputs": "jacobian_inputs", "params": "jacobian_params"}
+# Groups of arguments along which quantities have derivatives.
+GROUPS = ("q", "u", "z", "inputs", "p", "t")
+# Enclosures of what vanishes at events: with the first two derivatives, and of the values alone.
+BOUNDS, RANGES = "event_bounds", "event_ranges"
 _OUTPUT = "output_"
 
 

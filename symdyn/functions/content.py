@@ -24,8 +24,8 @@ from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
-from symdyn.formulation.names import outputs_in, second_named
+from symdyn.formulation.event_bounds import enclosed, event_leaves, unknowns, unproved
+from symdyn.formulation.names import BOUNDS, outputs_in, second_named
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.packed import band
 from symdyn.functions.sensitivities import column_names, held_names

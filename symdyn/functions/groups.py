@@ -10,7 +10,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.event_bounds import BOUNDS, RANGES
+from symdyn.formulation.names import BOUNDS, RANGES
 from symdyn.functions.packed import band
 from symdyn.functions.sensitivities import adjoints_of, functions_of
 from symdyn.functions.table import BATCH, CONSISTENCY, FUNCTIONS, STANDARD, STATICS

@@ -14,22 +14,14 @@ import numpy as np
 from symdyn.backend.columns import Group, MotionColumns
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
-from symdyn.formulation.names import rate_of, variation_of
+from symdyn.formulation.names import ADJOINT, rate_of, variation_of
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
+from symdyn.functions.table import CARRIED, CORRECTED, CORRECTED_WEIGHTS, OF_EVENTS, OF_RESETS, WEIGHTS
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import reverse, seed_name
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, SEED, STATE
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import Output, Tape
-
-# [q; u] of all columns after the projection of the state; of values at events, and of resets, their derivatives by the time and
-# along every column; u of all columns after a reset that constraints carry on.
-CORRECTED, OF_EVENTS, OF_RESETS, CARRIED = COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns",
-                                                      "carried_columns")
-
-
-# From weights of x_dot, and of the state after its projection, to those of the state before and of what there is to change.
-ADJOINTS = ADJOINT, CORRECTED_ADJOINT = "rhs_weights", "corrected_weights"
 
 
 def column_names(symbols: Symbols, sensitivities: Sequence[str]) -> list[str]:
@@ -47,7 +39,7 @@ def held_names(sensitivities: Sequence[str], held: Sequence[str]) -> list[str]:
 def functions_of(equations: Equations) -> tuple[str, ...]:
     """The functions that a run with sensitivities needs besides those of any run."""
     names = [CORRECTED] if equations.constraints or equations.unit_groups else []
-    further = {OF_EVENTS: "events", OF_RESETS: "event_resets", CARRIED: "carried_variation"}
+    further = {OF_EVENTS: "events", OF_RESETS: "event_resets", CARRIED: variation_of("carried")}
     return (*names, *[name for name, quantity in further.items() if quantity in equations.quantities])
 
 
@@ -64,7 +56,7 @@ def _later_names(sensitivities: Sequence[str]) -> list[str]:
 
 def adjoints_of(equations: Equations) -> tuple[str, ...]:
     """The functions that a run backwards needs besides those of the run."""
-    return (ADJOINT, *([CORRECTED_ADJOINT] if equations.constraints or equations.unit_groups else ()))
+    return (WEIGHTS, *([CORRECTED_WEIGHTS] if equations.constraints or equations.unit_groups else ()))
 
 
 def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held: Sequence[str] = (),
@@ -78,11 +70,11 @@ def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held:
         parts = [equations.quantity("rhs"), *[_with(equations, way, column) for column in columns]]
         return _tape(equations, name, np.concatenate(parts))
     if name == CORRECTED:
-        return _tape(equations, name, np.concatenate([_with(equations, "corrected_variation", _normal(equations, column))
+        return _tape(equations, name, np.concatenate([_with(equations, variation_of("corrected"), _normal(equations, column))
                                                       for column in columns]))
     if name == CARRIED:
         later = [equations.recorder.leaf(name, ACCELERATION) for name in _later_names(sensitivities)]
-        return _tape(equations, name, np.concatenate([_with(equations, "carried_variation", column, then)
+        return _tape(equations, name, np.concatenate([_with(equations, variation_of("carried"), column, then)
                                                       for column, then in zip(columns, later, strict=True)]))
     of = "events" if name == OF_EVENTS else "event_resets"
     parts = [equations.quantity(rate_of(of)), *[_with(equations, variation_of(of), column) for column in columns]]
@@ -111,11 +103,11 @@ def adjoint_tape_of(equations: Equations, name: str, by: Sequence[str]) -> Tape:
     symbols, recorder = equations.symbols, equations.recorder
     n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
     given = [s.name for s in (*symbols.inputs, *symbols.parameters)]
-    if name == ADJOINT:
-        result = list(equations.quantity("adjoint"))
+    if name == WEIGHTS:
+        result = list(equations.quantity(ADJOINT))
     else:
         leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(symbols)]
-        moved = _with(equations, "corrected_variation", _normal(equations, {"x": leaves[:n_x], "by": leaves[n_x:]}))
+        moved = _with(equations, variation_of("corrected"), _normal(equations, {"x": leaves[:n_x], "by": leaves[n_x:]}))
         n_qu = len(moved)
         weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(n_x)]
         total = sum((w * e for w, e in zip(weights, [*moved, *leaves[n_qu:n_x]], strict=True)), 0)

@@ -1,13 +1,34 @@
-"""The functions of a module in one table: the quantity behind each, the shape of its result, what it says, what it needs.
+"""All functions and quantities in one table: the quantity behind each, the shape of its result, what it says, what it needs.
+
+Those of FUNCTIONS, STATICS, VARIATIONS and DERIVATIVES are for users. Besides them there are those that integrators call, the
+intermediate quantities of formulations, and families, whose names have parts: `entry_of` finds the entry of any name.
 
 Shapes are in these letters: n_q coordinates, n_u speeds, n_z further states, n_x = n_q + n_u + n_z, n_in inputs, n_p parameters,
-n_c rows of constraints, n_b bodies, n_j joints, n_e events, d = 6 velocities of a body, in a plane 3. A function without a shape
-here has one that the mechanism decides.
+n_c rows of constraints, n_b bodies, n_j joints, n_e events. A function without a shape here has one that the mechanism decides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+from symdyn.backend.packed import NAME as PACKED
+from symdyn.formulation.names import (
+    ADJOINT,
+    BOUNDS,
+    GROUPS,
+    HESSIAN_PRODUCT,
+    RANGES,
+    along_group,
+    curvature_named,
+    derivative_named,
+    link_named,
+    output_named,
+    rate_of,
+    second_named,
+    stabilized,
+    variation_of,
+)
 
 
 @dataclass(frozen=True)
@@ -138,6 +159,120 @@ DERIVATIVES = _entries(
      "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by u; ud: u_dot, lam", ""),
 )
 ALL = {**FUNCTIONS, **STATICS, **VARIATIONS, **DERIVATIVES}
+
+# [q; u] of all columns after the projection of the state; of values at events, and of resets, their derivatives by the time and
+# along every column; u of all columns after a reset that constraints carry on.
+CORRECTED, OF_EVENTS, OF_RESETS, CARRIED = COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns",
+                                                      "carried_columns")
+# From weights of x_dot, and of the state after its projection, to those of the state before and of what there is to change.
+WEIGHTS, CORRECTED_WEIGHTS = ADJOINTS = ("rhs_weights", "corrected_weights")
+# Functions that only integrators call.
+OF_INTEGRATORS = _entries(*[(name, name, None, title, needs) for name, title, needs in (
+    (BOUNDS, "bounds of the values at events and of their first two derivatives within bounds of their arguments", "events"),
+    (RANGES, "bounds of the values at events within bounds of their arguments", "events"),
+    (PACKED, "the entries of jacobian_x that may differ from zero, row by row", "statements for x_dot"),
+    (CORRECTED, "columns of sensitivities after the projection of the state", ""),
+    (OF_EVENTS, "values at events by the time, and along every column of sensitivities", "events"),
+    (OF_RESETS, "what resets make of the state by the time, and along every column of sensitivities", "events with resets"),
+    (CARRIED, "columns of sensitivities after a reset that constraints carry on", "events with resets, constraints"),
+    (WEIGHTS, "from weights of x_dot to those of x and of what there is to change", ""),
+    (CORRECTED_WEIGHTS, "from weights of the projected state to those of the state before", ""))])
+
+_UNKNOWNS = ("n_u + n_c",)
+_ARGUMENTS = ("n_x + n_in + n_p + 1",)
+# Quantities that functions are made of.
+INTERMEDIATE = _entries(*[(name, name, shape, title, needs) for name, shape, title, needs in (
+    ("bias", _ROW_OF_U, "k_tilde - F_tilde", ""),
+    ("accelerations", _ROW_OF_U, "u_dot", ""),
+    ("rates", ("n_q",), "q_dot", ""),
+    ("unknowns", _UNKNOWNS, "what the equations are solved for: u_dot, lam", ""),
+    *[(along_group("unknowns", group), _UNKNOWNS, f"derivative of the unknowns along a direction in the group {group}", "")
+      for group in GROUPS],
+    ("matrix", ("n_u + n_c", "n_u + n_c"), "matrix of the equations in the unknowns", _CONSTRAINTS),
+    ("right_side", _UNKNOWNS, "right side of the equations in the unknowns", _CONSTRAINTS),
+    *[(stabilized(name), shape, f"{name}, stabilized by Baumgarte's method", _CONSTRAINTS)
+      for name, shape in (("rhs", _ROW_OF_X), ("jacobian_x", ("n_x", "n_x")), ("unknowns", _UNKNOWNS))],
+    *[(along_group(stabilized("unknowns"), group), _UNKNOWNS,
+       f"derivative of the stabilized unknowns along a direction in the group {group}", _CONSTRAINTS) for group in GROUPS],
+    (ADJOINT, _ARGUMENTS, "gradient of a weighted sum of x_dot by x, inputs, parameters and t", ""),
+    *[(along_group(ADJOINT, group), _ARGUMENTS, f"derivative of this gradient along a direction in the group {group}", "")
+      for group in GROUPS],
+    (variation_of("rhs"), _ROW_OF_X, "derivative of x_dot along a direction of x, inputs and parameters", ""),
+    ("rhs_variation_by_matrix", _ROW_OF_X, "the same, by a matrix that many directions share", ""),
+    (variation_of("corrected"), ("n_q + n_u",), "derivative of the projected coordinates and speeds along a direction", ""),
+    (variation_of("carried"), _ROW_OF_U, "derivative of the speeds after a reset that constraints carry on",
+     "events with resets, constraints"),
+    ("outputs_sensitivity", None, "derivative of the outputs along the motion", ""),
+    *[(of(name), shape, f"derivative of {name} {way}", "") for name, shape in (("events", ("n_e",)), ("event_resets", None))
+      for of, way in ((rate_of, "by the time alone"), (variation_of, "along a direction"))],
+    ("Jdot", None, "derivative of J by the time", ""),
+    ("page_inverse_dynamics", _ROW_OF_U, "tau by the inward recursion of the links", "a tree in recursive form"),
+    ("page_accelerations", _ROW_OF_U, "u_dot by the outward recursion of the links", "a tree in recursive form"),
+    ("r", None, "positions that were given", "equations from given positions"),
+    ("F_c", None, "M r_ddot - F", "equations from given positions"),
+    ("kinetic_energy", (), "kinetic energy, J", "equations from given matrices"),
+    ("constraint_force", _ROW_OF_U, "-C_r^T lam", "constraints on given matrices"))])
+EVERY = {**{entry.quantity: entry for entry in ALL.values()}, **ALL, **OF_INTEGRATORS, **INTERMEDIATE}
+
+
+_SIZES = {"x": "n_x", "inputs": "n_in", "params": "n_p", "t": "1", "ud": "n_u"}
+_ALONG_LINK = ("S", "S_ring")
+_MATRICES = ("X", "X_star", "I", "I_A")
+
+
+def _derivative(name: str) -> FunctionEntry | None:
+    one = derivative_named(name)
+    if one is None or one.of not in ALL:
+        return None
+    of = ALL[one.of]
+    shape = None if of.shape is None else (*of.shape, _SIZES[one.by])
+    return FunctionEntry(name, shape, f"derivatives of {one.of} by {one.by}", of.needs)
+
+
+def _weighted(name: str) -> FunctionEntry | None:
+    one = second_named(name)
+    if one is None:
+        return None
+    n = " + ".join(_SIZES[by] for by in one.wrt)
+    shape = (n,) if one.kind in (ADJOINT, HESSIAN_PRODUCT) else (n, n)
+    what = {ADJOINT: "gradient", HESSIAN_PRODUCT: "second derivatives, times a direction,"}.get(one.kind, "second derivatives")
+    return FunctionEntry(name, shape, f"{what} of a weighted sum of x_dot by {', '.join(one.wrt)}", "")
+
+
+def _curvature(name: str) -> FunctionEntry | None:
+    one = curvature_named(name)
+    if one is None:
+        return None
+    n = " + ".join(_SIZES[by] for by in one.wrt)
+    return FunctionEntry(name, (n, n), f"second derivatives of a weighted sum of {one.of} by {', '.join(one.wrt)}", one.of)
+
+
+def _of_link(name: str) -> FunctionEntry | None:
+    one = link_named(name)
+    if one is None:
+        return None
+    shape = None if one.letter in _ALONG_LINK else ("6", "6") if one.letter in _MATRICES else ("6",)
+    return FunctionEntry(name, shape, f"{one.letter} of link {one.number}", "a tree in recursive form")
+
+
+def _output(name: str) -> FunctionEntry | None:
+    given = output_named(name)
+    return None if given is None else FunctionEntry(name, None, f"the output {given}", "outputs")
+
+
+# Names of several parts -> the function that gives the entry of such a name, None of others.
+FAMILIES: Mapping[str, Callable[[str], FunctionEntry | None]] = {
+    "output_<name>": _output, "<letter>_<link>": _of_link, "<function>_by_<group>": _derivative,
+    "adjoint_<groups>, hessian_<groups>, hessian_product_<groups>": _weighted,
+    "constraints_hessian_<groups>, outputs_hessian_<groups>": _curvature}
+
+
+def entry_of(name: str) -> FunctionEntry | None:
+    """The entry of a function or quantity, its own or that of its family; None for other names."""
+    if name in EVERY:
+        return EVERY[name]
+    return next((entry for family in FAMILIES.values() if (entry := family(name)) is not None), None)
+
 
 # Functions by which consistent states are found, compiled together.
 CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")

@@ -14,13 +14,15 @@ from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.constraints.motion import residual_names
 from symdyn.formulation.derivatives import UNKNOWNS, along, curvature, curved, derivative, gradient, seeds_in, weighted
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
+from symdyn.formulation.event_bounds import bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.names import (
     ADJOINT,
+    BOUNDS,
     BY,
     HESSIAN,
     HESSIAN_PRODUCT,
+    RANGES,
     curvature_named,
     derivative_named,
     differentiated,
@@ -31,7 +33,7 @@ from symdyn.formulation.names import (
 from symdyn.formulation.sensitivities import LATER, carried_names, direction_names, indices_of_resets
 from symdyn.functions import sensitivities as columns
 from symdyn.functions.packed import packed_tape, pattern
-from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
+from symdyn.functions.table import ADJOINTS, ALL, CARRIED, COLUMNS, DERIVATIVES, STATICS, VARIATIONS, WEIGHTS, quantity_of
 from symdyn.tape.balance import balance
 from symdyn.tape.jumps import Jump, jumps
 from symdyn.tape.tape import Output, Tape
@@ -55,9 +57,9 @@ def has_function(equations: Equations, name: str) -> bool:
         return bool(event_leaves(equations))
     if name == PACKED:
         return pattern(equations) is not None
-    if name in columns.COLUMNS:
+    if name in COLUMNS:
         return name in columns.functions_of(equations)
-    if name in columns.ADJOINTS:
+    if name in ADJOINTS:
         return name in columns.adjoints_of(equations)
     return quantity_of(name) in equations.quantities
 
@@ -102,10 +104,10 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
     """The tapes of functions; of rhs and its derivative by x with what the right-hand side is made with."""
     work, baumgarte = right_side.work, right_side.baumgarte
     of_columns = right_side.sensitivities
-    with_columns = ("rhs", *columns.COLUMNS) if of_columns else ()
+    with_columns = ("rhs", *COLUMNS) if of_columns else ()
     adjoint = right_side.adjoint or ()
     tapes = {name: columns.tape_of(equations, name, of_columns, right_side.held, right_side.followed) if name in with_columns else
-             columns.adjoint_tape_of(equations, name, adjoint) if name in columns.ADJOINTS else tape_as_derived(equations, name)
+             columns.adjoint_tape_of(equations, name, adjoint) if name in ADJOINTS else tape_as_derived(equations, name)
              for name in names}
     if work or baumgarte:
         field = equations.quantity(stabilized("rhs") if baumgarte else "rhs")
@@ -188,13 +190,13 @@ def given_rates(equations: Equations, names: Sequence[str], sensitivities: Seque
     behind bounds of events."""
     symbols, n_c = equations.symbols, len(equations.constraints)
     bounds = bound_names(event_leaves(equations)) if BOUNDS in names else []
-    if columns.CARRIED in names:
+    if CARRIED in names:
         return [*bounds, *columns.given_to_carry(equations, sensitivities)]
     if bounds:
         return bounds
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
-    if columns.ADJOINT in names:
+    if WEIGHTS in names:
         return weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
     if "outputs_sensitivity" in names:
         return direction_names(symbols)
