@@ -95,8 +95,8 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape.of(equations.recorder, **{name: derivative(equations, values, result.by)})
     if name != "outputs":
         return equations.tape(quantity_of(name))
-    values = [equations.quantity(q).ravel() for q in outputs_in(equations.quantities)]
-    whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
+    rows = [equations.quantity(q).ravel() for q in outputs_in(equations.quantities)]
+    whole = np.concatenate(rows) if rows else np.zeros(0, dtype=object)
     return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
 
 
