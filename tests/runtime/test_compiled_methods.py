@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -274,7 +275,9 @@ def test_compiled_methods_need_compiled_code(method: str, compiled: Callable[...
 
 
 def test_a_method_that_does_not_fit_says_why(pendulum: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(COMPILED, "needy", methods.CompiledMethod("needy", ("telepathy",)))
+    monkeypatch.setitem(METHODS, "needy", replace(METHODS["bs54"], name="needy", needs=("telepathy",)))
+    monkeypatch.setitem(METHODS, "picky", replace(METHODS["bs54"], name="picky"))
+    monkeypatch.setitem(COMPILED, "needy", methods.CompiledMethod("needy"))
     monkeypatch.setitem(COMPILED, "picky", methods.CompiledMethod("picky", unfit=lambda m, _: f"{m.name} is small"))
     with pytest.raises(ArgumentError, match="method 'needy' does not fit: its equations have no telepathy; use method='dop853'"):
         pendulum.simulate((0, 1), method="needy")
