@@ -78,7 +78,7 @@ def test_a_load_is_in_data_files_and_in_the_reference(kind: type) -> None:
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_is_in_the_command_line_and_in_the_documentation(name: str) -> None:
     simulate = next(action.choices["simulate"] for action in make_parser()._actions if isinstance(action.choices, dict))
-    assert f"{name} (" in simulate.format_help()
+    assert f"{name} (" in " ".join(simulate.format_help().split())
     assert f'`"{name}"`' in (DOCS / "choosing_a_method.md").read_text(encoding="utf-8")
     for documented in (Module.simulate, Module.ode_solver):
         assert f'"{name}"' in (inspect.getdoc(documented) or "")
