@@ -170,9 +170,13 @@ def _entries(tape: Tape) -> tuple[Any, ...]:
 
 def _together(parts: Sequence[tuple[str, Tape]], change: Callable[[Tape], Tape]) -> list[tuple[str, Tape]]:
     """A pass over all tapes as one, so that they still share their steps; a function has a second one where states are
-    singular."""
-    whole = change(Tape(parts[0][1].recorder, {str(k): next(iter(t.outputs.values())) for k, (_, t) in enumerate(parts)}))
-    return [(n, Tape(whole.recorder, {n: whole.outputs[str(k)]})) for k, (n, _) in enumerate(parts)]
+    singular. Under their own names, under which a choice may have balanced the first ones."""
+    first = {n: k for k, (n, _) in reversed(list(enumerate(parts)))}
+    keys = [n if first[n] == k else f"{n} {k}" for k, (n, _) in enumerate(parts)]
+    outputs = {key: next(iter(t.outputs.values())) for key, (_, t) in zip(keys, parts, strict=True)}
+    whole = change(Tape(parts[0][1].recorder, outputs))
+    return [(n, whole.prune((n,)) if key == n else Tape(whole.recorder, {n: whole.outputs[key]}))
+            for key, (n, _) in zip(keys, parts, strict=True)]
 
 
 def _by_name(values: Any) -> dict[str, float]:

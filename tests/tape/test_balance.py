@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
+
 import pytest
 
 import symdyn as sd
+from symdyn.choice import choose
+from symdyn.pipeline import emit
 from symdyn.tape import Tape
 from symdyn.tape import node as kinds
 from symdyn.tape.balance import balance
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import unsigned
 from tests import helpers
+
+balancing = importlib.import_module("symdyn.tape.balance")
 
 
 @pytest.mark.parametrize(("name", "options", "formulation"), [
@@ -79,3 +85,20 @@ def test_what_was_balanced_last_is_handed_out_once_more() -> None:
     r.name("sum", total)
     assert list(balance(tape).recorder.names.values()) == ["sum"]
     assert balance(Tape.of(r, y=[total, a])).operations == balance(Tape.of(r, y=[total])).operations == 3
+
+
+def test_a_balanced_choice_is_emitted_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sums are reordered once, for the choice, and not again for the code of the right-hand side."""
+    equations = choose(sd.systems.get("n_link_pendulum", n=6).check(), formulation="recursive")
+    seen: list[Tape] = []
+
+    class Counted(balancing._Balancer):
+        def __init__(self, tape: Tape) -> None:
+            seen.append(tape)
+            super().__init__(tape)
+
+    monkeypatch.setattr(balancing, "_Balancer", Counted)
+    emit(equations, "c", ("rhs",), standalone=False, integrator=False)
+    assert not seen
+    emit(equations, "c", ("rhs",), standalone=False, integrator=False)  # what was balanced last is handed out once
+    assert len(seen) == 1
