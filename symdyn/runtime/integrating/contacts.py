@@ -39,8 +39,8 @@ from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.hybrid import CODES, CONTACTS, SHARED, Done, Laws, Motion
 from symdyn.runtime.integrating.mode_codes import MODES
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
-from symdyn.runtime.integrating.slip_begins import LARGER, LONGEST, SHORTEST, TOLERATED, SlipBegins
-from symdyn.runtime.integrating.slip_begins import ROUNDED as RESOLVED
+from symdyn.runtime.integrating.slip_begins import LARGER, LONGEST, TOLERATED, SlipBegins
+from symdyn.runtime.integrating.slip_begins import ROUNDED as ROUNDED_SPEEDS
 from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.shared_forces import least_solution
@@ -543,7 +543,7 @@ class _Phases:
             return []
         forces = self._by_modes(t, x).force
         size = float(np.abs(forces).max(initial=0.0))
-        return [(k, "opens") for k in passed if forces[self.normal[k]] < -RESOLVED * size]
+        return [(k, "opens") for k in passed if forces[self.normal[k]] < -ROUNDED_SPEEDS * size]
 
     def _demand_pressed(self, t: float, x: np.ndarray) -> None:
         """Raise _Stop where a closed contact pulls, at the end of a phase."""
@@ -1155,7 +1155,7 @@ class _Phases:
                 candidates[k, "opens"] = size
             bound = float(at.static[k]) * pressed
             if mode == STICKING and bound - np.linalg.norm(forces[self.tangents[k]]) <= AT_BOUND * size:
-                candidates[k, "slips"] = size * max(bound, RESOLVED * size)
+                candidates[k, "slips"] = size * max(bound, ROUNDED_SPEEDS * size)
         if not candidates:
             return []
         p, n, end = self._parameters(), self.request.n_state, self.request.span[1]
@@ -1163,10 +1163,10 @@ class _Phases:
         now = self._values("events", t, x[:n], p)[indices]
         rate = self._values("rhs", t, x[:n], p).copy()
         unknown, result = now < 0, np.zeros(len(indices), dtype=bool)
-        after = max(SHORTEST * self.begins.length, 64 * np.finfo(float).eps * abs(t))
+        after = self.begins.shortest(t)
         while unknown.any() and after <= min(LONGEST * self.begins.length, end - t):
             change = self._values("events", t + after, self._stepped(t, x, rate, p, after), p)[indices] - now
-            known = unknown & (np.abs(change) > RESOLVED * sizes)
+            known = unknown & (np.abs(change) > ROUNDED_SPEEDS * sizes)
             result |= known & (change < 0)
             unknown &= ~known
             after *= LARGER

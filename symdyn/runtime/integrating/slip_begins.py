@@ -46,11 +46,15 @@ class SlipBegins:
         self.since = {k: t if k in begins else self.since[k] for k, space in sliding.items()
                       if space and (k in begins or k in self.since)}
 
+    def shortest(self, t: float) -> float:
+        """The shortest time from t on that is looked at, s."""
+        return max(SHORTEST * self.length, RESOLVED * abs(t))
+
     def held_until(self, t: float, x: np.ndarray, rate: Callable[[float, np.ndarray], np.ndarray],
                    slips: Callable[[float, np.ndarray], Mapping[int, np.ndarray]], tolerated: float) -> float:
         """Until when directions are held; rate: x_dot with them, slips: of contacts at a state, tolerated: an error of these."""
         wanted = TOLERATED * tolerated + ROUNDED * float(np.abs(x).max(initial=0.0))
-        shortest = max(SHORTEST * self.length, RESOLVED * abs(t))
+        shortest = self.shortest(t)
         after, most = max(GUESS * self.length, shortest), LONGEST * self.length
         f = rate(t, x)
         for _ in range(GUESSES):
