@@ -242,7 +242,7 @@ class Locator:
         """
         self.now = value = self.values(t, x)
         change = self.values(t + step, x + step * xd) - value
-        fired = np.isin(np.arange(len(value)), self.fired)
+        fired = self._has_fired()
         # A quantity that has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it.
         left = 2 * np.abs(self.left) + np.abs(change)
         self.size = np.abs(x)
@@ -361,11 +361,15 @@ class Locator:
         leaves = self.module.metadata.event_leaves
         return self.module.evaluate(name, t, state, self.p, given, jets[list(leaves)].ravel())
 
+    def _has_fired(self) -> np.ndarray:
+        """Mask of the events of the latest time, (n_e,)."""
+        return np.isin(np.arange(len(self.look)), self.fired)
+
     def _keep_sides(self, samples: np.ndarray) -> None:
         """Put quantities that have just vanished, and are at the end of a panel no more than rounding has left of them at their
         zero, on the side that they go to: a panel may be as short as rounding, where a controller has an instant."""
         value = samples[panels.N - 1]
-        fired = np.isin(np.arange(len(value)), self.fired)
+        fired = self._has_fired()
         samples[panels.N - 1] = np.where(fired & (value * self.side < 0) & (np.abs(value) <= np.abs(self.left)), -value, value)
 
     def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
