@@ -11,7 +11,7 @@ import json
 import math
 import os
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -299,5 +299,9 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     rows = measured(sizes, measure, HEADING, to_json)
     print(f"error of accelerations relative to equations by hand with {DIGITS} digits (<= {BOUNDS[0]:.1e} of the condition "
           f"number); energy and C over {DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
-    return sum(result > bound for row in rows
-               for result, bound in zip((row.error / row.condition, row.energy, row.violation), BOUNDS, strict=True))
+    return missed([(row.error / row.condition, row.energy, row.violation) for row in rows], BOUNDS)
+
+
+def missed(errors: Iterable[Sequence[float]], bounds: Sequence[float]) -> int:
+    """The number of errors above their bounds, of rows of a table."""
+    return sum(error > bound for row in errors for error, bound in zip(row, bounds, strict=True))

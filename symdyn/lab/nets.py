@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
-from symdyn.lab.bridges import measured, microseconds, with_children
+from symdyn.lab.bridges import measured, microseconds, missed, with_children
 from symdyn.lab.particles import add_particle
 from symdyn.model.closures import Rod
 from symdyn.model.symbols import parameters
@@ -160,5 +160,4 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     rows = measured(sizes, measure, HEADING, to_json)
     print(f"error of accelerations relative to equations by hand with {BITS} bits (<= {BOUNDS[0]:g}); energy and C over "
           f"{DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
-    return sum(result > bound for row in rows
-               for result, bound in zip((row.error, row.energy, row.violation), BOUNDS, strict=True))
+    return missed([(row.error, row.energy, row.violation) for row in rows], BOUNDS)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
-from symdyn.lab.bridges import BITS, DIGITS, Bar, Bridge, by_hand, measured, microseconds, with_children
+from symdyn.lab.bridges import BITS, DIGITS, Bar, Bridge, by_hand, measured, microseconds, missed, with_children
 from symdyn.pipeline import emit
 from symdyn.systems import get
 
@@ -115,5 +115,4 @@ def run(sizes: Sequence[int] = SIZES, to_json: Path | None = None) -> int:
     rows = measured(sizes, measure, HEADING, to_json)
     print(f"error of accelerations relative to equations by hand with {DIGITS} digits (<= {BOUNDS[0]:g}); energy and C over "
           f"{DURATION:g} s at rtol {RTOL:g}, relative (<= {BOUNDS[1]:g}, {BOUNDS[2]:g})")
-    return sum(result > bound for row in rows
-               for result, bound in zip((row.error, row.energy, row.violation), BOUNDS, strict=True))
+    return missed([(row.error, row.energy, row.violation) for row in rows], BOUNDS)
