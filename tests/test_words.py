@@ -197,7 +197,7 @@ def test_the_readme_of_templates_begins_sentences_with_their_subject() -> None:
 def test_a_late_subject_is_found(tmp_path: Path) -> None:
     """In a docstring, a comment and a message of a module, in a comment of C; not in questions, code and within sentences."""
     texts = {"module.py": '"""Mass. Of two the\nfirst."""\nWhat = 1  # What is left\nraise Error("none: What is zero is left")\n',
-             "asked.py": '"""What is it\nfor?"""\nprint("Which one? It tells what is left")  # of two\n',
+             "asked.py": '"""What is it\nfor?"""\nprint("Which one? It shows what is left")  # of two\n',
              "run.h": "// Rows. How many there are.\nint n;  // Whatever\n"}
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
