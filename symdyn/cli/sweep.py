@@ -188,11 +188,13 @@ def _executor(arguments: argparse.Namespace, module: Module, device: str = "cpu"
             from distributed import Client
         except ImportError:
             raise MissingExtra("--dask needs Dask: pip install 'symdyn[dask]'") from None
+        from symdyn.ensembles.dispatch import silent_connections
+
         try:
             client = Client(address, timeout=arguments.dask_timeout)
         except (OSError, ValueError, TimeoutError) as error:
             raise Stop(f"--dask {address}: no scheduler there ({error})", FAILED) from None
-        with client:
+        with silent_connections(), client:
             yield client.get_executor()
         return
     from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor

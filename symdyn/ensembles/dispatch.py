@@ -22,6 +22,8 @@ AHEAD = 3
 RECOUNT = 2.0
 # Seconds between looks at a client that tries to connect again.
 CONNECTING = 0.1
+# Logs to which Dask writes the traceback of a connection that is lost, which symdyn reports in one line.
+LOGS_OF_CONNECTIONS = ("distributed.batched", "distributed.client")
 
 
 class ExecutorFailed(SymdynError):
@@ -128,7 +130,7 @@ class _Pool:
     def is_gone(self) -> bool:
         """Whether the scheduler does not answer any more, after the client has tried to connect again."""
         if self.client is not None and self.client.status == "connecting":
-            with _silent("distributed.client"):  # who asks for it reports it
+            with silent_connections():  # who asks for it reports it
                 while self.client.status == "connecting":
                     clock.sleep(CONNECTING)
         return self.client is not None and self.client.status != "running"
@@ -149,15 +151,17 @@ class _Pool:
 
 
 @contextlib.contextmanager
-def _silent(name: str) -> Iterator[None]:
-    """A log that prints nothing for a while."""
-    log = logging.getLogger(name)
-    before = log.disabled
-    log.disabled = True
+def silent_connections() -> Iterator[None]:
+    """Dask's logs of connections print nothing for a while."""
+    logs = [logging.getLogger(name) for name in LOGS_OF_CONNECTIONS]
+    before = [log.disabled for log in logs]
+    for log in logs:
+        log.disabled = True
     try:
         yield
     finally:
-        log.disabled = before
+        for log, disabled in zip(logs, before, strict=True):
+            log.disabled = disabled
 
 
 async def _follow(asked: Any, result: Future[Done]) -> None:

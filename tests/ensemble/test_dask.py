@@ -185,6 +185,30 @@ def test_a_scheduler_that_is_gone_is_reported_in_one_line(tmp_path):
     assert f"3000 samples of q1, {kept} of them computed before" in again
 
 
+LOSS = """
+import os, signal, sys, time
+from argparse import Namespace
+from symdyn.cli.sweep import _executor
+
+process, address = int(sys.argv[1]), sys.argv[2]
+with _executor(Namespace(dask=address, dask_timeout=2.0, join=False), None) as executor:
+    os.kill(process, signal.SIGKILL)
+    for number in range(200):
+        executor.submit(abs, number, pure=False)
+        time.sleep(0.001)
+    time.sleep(1)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX")
+def test_what_dask_still_sends_to_a_scheduler_that_is_gone_prints_nothing():
+    pytest.importorskip("distributed")
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as there:
+        address = there.stdout.readline().strip()
+        asked = [sys.executable, "-c", LOSS, str(there.pid), address]
+        assert subprocess.run(asked, capture_output=True, text=True, check=True).stderr == ""
+
+
 class Client:
     """Stand-in for Dask's: `lost` of its futures have no end when its scheduler is lost, after which it is as `then` says."""
 
