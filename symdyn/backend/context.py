@@ -13,7 +13,7 @@ from symdyn import panels
 from symdyn.backend.batch import Batch
 from symdyn.backend.function import Function, Part
 from symdyn.backend.gathered import Gathered
-from symdyn.backend.integrated import Integrated, Shape
+from symdyn.backend.integrated import Integrated, Shape, level_of_control
 from symdyn.backend.metadata import EventRecord, Metadata, Sizes
 from symdyn.backend.methods import Method
 from symdyn.backend.parts import Parts
@@ -332,6 +332,11 @@ class Integrator:
     gathered: Gathered
     functions: tuple[Integrated, ...]
     macros: tuple[tuple[str, float], ...]
+
+    @property
+    def level_of_control(self) -> str:
+        """Option of optimization for the unit that controls steps, or the whole of a method without stages; "": the usual one."""
+        return level_of_control(self.method, self.shape)
 
     @property
     def events(self) -> Sequence[EventRecord]:

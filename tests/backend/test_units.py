@@ -55,6 +55,25 @@ def test_long_texts_take_a_lower_level(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [unit.level for unit in found if unit.shared] == [unit.level for unit in usual if unit.shared]
 
 
+def test_control_of_steps_takes_the_level_at_which_runs_are_as_fast(derived: Callable[..., Any]) -> None:
+    """The last shared unit: with twelve stages, with seven, with events, and of a method without stages."""
+    for equations, method, wanted in ((derived("double_pendulum"), "dop853", ["", "-O1"]),
+                                      (derived("double_pendulum"), "bs54", ["", "-O2"]),
+                                      (ball().embedding(), "dop853", ["", "-O2"]), (derived("double_pendulum"), "radau5", [""])):
+        assert [unit.level for unit in translation_units(text_of(equations, method)) if unit.shared] == wanted
+
+
+@needs_c
+def test_units_that_take_longest_are_compiled_first(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if require_compiler().kind not in ("gcc", "clang"):
+        pytest.skip("units are for gcc and clang")
+    seen = compilations(monkeypatch)
+    texts = [TranslationUnit(f"int f{k}(void) {{ return {'1 +' * n} 1; }}\n", True, level)
+             for k, (n, level) in enumerate([(100, ""), (190, "-O1"), (150, "-O2"), (50, "")])]
+    assert objects.built_from_units(joined(texts), cache / "made.so", require_compiler(), cache)
+    assert [Path(command[command.index("-c") - 1]).stem for command in seen] == ["unit_2", "unit_0", "unit_1", "unit_3"]
+
+
 def test_units_of_a_text() -> None:
     several = [TranslationUnit("a\n"), TranslationUnit("b\n", True), TranslationUnit("c\n", True, "-O2"), TranslationUnit("d\n")]
     assert translation_units(joined(several)) == several
