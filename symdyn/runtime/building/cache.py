@@ -18,7 +18,7 @@ from pathlib import Path
 
 from symdyn.errors import CacheError, CompileError
 from symdyn.runtime.building.cache_folder import cache_dir
-from symdyn.runtime.building.compiler import LINUX, WINDOWS, Compiler, flags, link_flags
+from symdyn.runtime.building.compiler import LINUX, WINDOWS, Compiler, flags, link_flags_here
 from symdyn.runtime.building.objects import built_from_units, is_whole, key_of, run, seal_of
 from symdyn.runtime.building.stored import PRIVATE, digest, write_whole
 from symdyn.shown import shown
@@ -86,7 +86,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _target(source: str, stem: str, compiler: Compiler) -> Path:
-    key = key_of(source, compiler, *flags(compiler), *link_flags(compiler))
+    key = key_of(source, compiler, *flags(compiler), *link_flags_here(compiler))
     return cache_dir() / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', stem)[:LONGEST]}-{key}{SUFFIX}"
 
 
@@ -140,7 +140,7 @@ def _failure(compiler: Compiler, kept: Path, target: Path, fault: str, output: s
 
 
 def _command(compiler: Compiler, source: Path, library: Path) -> list[str]:
-    return [*compiler.command, "-o", str(library), str(source), *flags(compiler), *link_flags(compiler)]
+    return [*compiler.command, "-o", str(library), str(source), *flags(compiler), *link_flags_here(compiler)]
 
 
 @functools.cache

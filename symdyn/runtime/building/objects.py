@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from symdyn.runtime.building.compiler import Compiler, flags, link_flags
+from symdyn.runtime.building.compiler import Compiler, flags, link_flags_here
 from symdyn.runtime.building.stored import PRIVATE, digest, write_whole, writers
 from symdyn.translation_units import TranslationUnit, translation_units
 
@@ -25,16 +25,20 @@ from symdyn.translation_units import TranslationUnit, translation_units
 _POLL = 0.002
 # Compilers that write object files with -c, and start quickly.
 _WITH_OBJECTS = ("gcc", "clang")
+# Time that a text takes with these options, compared with the usual one: as gcc 12 does for integrators.
+_SHARES = {"-O1": 0.5, "-O2": 0.8}
 
 
 @dataclass(frozen=True)
 class _Job:
-    """A unit that is compiled: its options, text and object; kept: where the object goes in the cache."""
+    """A unit that is compiled: its options, text and object; kept: where the object goes in the cache; work: what it takes, by
+    its length and its level of optimization."""
 
     options: list[str]
     source: Path
     made: Path
     kept: Path | None
+    work: float
 
 
 def built_from_units(source: str, library: Path, compiler: Compiler, cache: Path) -> bool:
@@ -51,13 +55,14 @@ def built_from_units(source: str, library: Path, compiler: Compiler, cache: Path
             continue
         text = folder / f"unit_{k}.c"
         text.write_text(unit.text, encoding="utf-8", newline="\n")
-        jobs.append(_Job(_object_flags(compiler, unit), text, folder / f"unit_{k}.o", kept))
+        work = len(unit.text) * _SHARES.get(unit.level, 1.0)
+        jobs.append(_Job(_object_flags(compiler, unit), text, folder / f"unit_{k}.o", kept, work))
         objects.append(jobs[-1].made)
-    # Long texts first, so that no core waits for one of them at the end.
-    jobs.sort(key=lambda job: -job.source.stat().st_size)
+    # Those that take longest first, so that no core waits for one of them at the end.
+    jobs.sort(key=lambda job: -job.work)
     if not _compiled(jobs, compiler, cache):
         return False
-    command = [*compiler.command, "-o", str(library), *map(str, objects), *flags(compiler), *link_flags(compiler)]
+    command = [*compiler.command, "-o", str(library), *map(str, objects), *flags(compiler), *link_flags_here(compiler)]
     fault, _ = run(command, cache)
     if fault or not library.is_file():
         return False
