@@ -1,18 +1,15 @@
-"""Pages that need no network: the environment of their templates, and how they are written."""
+"""Pages that need no network: how they are filled in from frozen records, and how they are written."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from symdyn.errors import ArgumentError
 from symdyn.folders import templates_folder
-
-if TYPE_CHECKING:
-    import jinja2
-
+from symdyn.named_records import NamedRecords
 
 # A table with more rows or columns than this stands in a box in which it scrolls.
 ROWS = 12
@@ -34,12 +31,13 @@ def titled(thing: object, *tables: str) -> str:
     return f"<div><b>{escape(repr(thing))}</b>{''.join(tables)}</div>"
 
 
-def page_environment() -> jinja2.Environment:
-    """For the shipped templates of HTML pages; text in them is escaped."""
+def filled(template: str, context: NamedRecords) -> str:
+    """An HTML page from a shipped template, in which text is escaped; context: the records that it reads."""
     import jinja2
 
-    return jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
-                              trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True)
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
+                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True)
+    return environment.get_template(template).render(context.names())
 
 
 def write_text(path: Path, text: str, what: str) -> Path:

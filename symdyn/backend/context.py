@@ -6,7 +6,7 @@ They are listed for authors of templates in templates/README.md, which tests/bac
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from symdyn import panels
@@ -20,6 +20,7 @@ from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program
 from symdyn.backend.reference import Reference
 from symdyn.backend.user_functions import UserText
+from symdyn.named_records import NamedRecords
 from symdyn.tape.intrinsics import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 
 _C_TYPE = {"t": "double t", **{g: f"const double *{g}" for g in ("q", "u", "z", "ud", "inputs", "p", "c", "v")},
@@ -378,15 +379,6 @@ class Integrator:
     def panel(self) -> Panel:
         """Numbers of the test that finds events between samples."""
         return Panel(tuple(panels.roundings(self.shape.n_x).tolist()))
-
-
-@dataclass(frozen=True)
-class NamedRecords:
-    """Records that templates get, each by its name."""
-
-    def names(self) -> dict[str, Any]:
-        """Each record by its name, as Jinja2 takes them."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
 @dataclass(frozen=True)

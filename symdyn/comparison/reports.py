@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +29,7 @@ from symdyn.comparison.typeset import (
 )
 from symdyn.comparison.verdict import FormulaResult, Verdict
 from symdyn.errors import ArgumentError
+from symdyn.named_records import NamedRecords
 from symdyn.report.latex import letters
 
 FILES = ("comparison.html", "comparison.tex", "errata.html", "errata.md")
@@ -39,6 +40,132 @@ PRINTED = ("\u201cPrinted\u201d is what the transcription of the slides as text 
 COLUMN, PAGE = 50, 106
 # The same of the list of errata.
 ERRATA_COLUMN, ERRATA_PAGE = 30, 90
+
+
+@dataclass(frozen=True)
+class OfVerdict:
+    """Number of entries of a verdict, which is a class of the page's style and a text."""
+
+    verdict: str
+    text: str
+    n: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """All comparisons together.
+
+    counts     of entries by verdict; total: of these; proved of the `decided`
+    n_errata   formulas that are wrong as printed; n_slips: how many slips these have
+    printed    explanation of the first column
+    """
+
+    counts: tuple[OfVerdict, ...]
+    total: int
+    proved: int
+    decided: int
+    n_errata: int
+    n_slips: int
+    printed: str
+
+
+@dataclass(frozen=True)
+class FormulaShown:
+    """A formula, texts and lines that are typeset; wide: too wide for columns."""
+
+    name: str
+    slide: str
+    also: str
+    wide: bool
+    verdict: str
+    summary: str
+    printed: tuple[Any, ...]
+    derived: tuple[Any, ...]
+    where: tuple[Any, ...]
+    notes: tuple[str, ...]
+    ways: str
+    proofs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CaseShown:
+    """A case, with the numbers of its entries by verdict and its formulas."""
+
+    name: str
+    title: str
+    section: str
+    counts: tuple[OfVerdict, ...]
+    formulas: tuple[FormulaShown, ...]
+
+
+@dataclass(frozen=True)
+class CorrectionShown:
+    """A place that is wrong, as printed and right: lines that are typeset (HTML), or LaTeX."""
+
+    place: str
+    printed: Any
+    right: Any
+
+
+@dataclass(frozen=True)
+class ErratumShown:
+    """A formula that is wrong as printed, as text.
+
+    latex     its letters, typeset or as they are; line: of the slides' text, if known; also: further lines
+    kind      of the evidence, with its sentence and the residuals of the print and the right formula
+    more      how many entries are left out
+    """
+
+    case: str
+    formula: str
+    latex: Any
+    slide: str
+    why: str
+    slip: str
+    line: int | None
+    also: str
+    wide: bool
+    kind: str
+    sentence: str
+    printed_residual: str
+    right_residual: str
+    more: int
+    corrections: tuple[CorrectionShown, ...]
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A slip, with the formulas that repeat it."""
+
+    sentence: str
+    errata: tuple[ErratumShown, ...]
+
+
+@dataclass(frozen=True)
+class RemarkShown:
+    """An error of a slide without a formula to compare."""
+
+    why: str
+    line: int | None
+    also: str
+    case: str
+
+
+@dataclass(frozen=True)
+class ComparisonContext(NamedRecords):
+    """The records that the page and the document of comparisons get."""
+
+    summary: Summary
+    cases: tuple[CaseShown, ...]
+
+
+@dataclass(frozen=True)
+class ErrataContext(NamedRecords):
+    """The records that the lists of errata get."""
+
+    summary: Summary
+    slips: tuple[Slip, ...]
+    remarks: tuple[RemarkShown, ...]
 
 
 def write_reports(comparisons: Comparisons, folder: Path) -> list[Path]:
@@ -69,15 +196,20 @@ def report(comparisons: Comparisons, name: str) -> str:
     environment.filters["tex"] = _tex
     environment.filters["count"] = counted
     pages = Pages(*((cache(lambda latex: _safe(mathml(latex))), "#b00020") if ending == "html" else (str, "wrong")))
-    of_errata = name.startswith("errata")
-    cases = [] if of_errata else [_case(c, pages) for c in comparisons]
-    return environment.get_template(f"report/{name}.jinja").render(
-        cases=cases, slips=_slips(comparisons, pages, ending == "html") if of_errata else [],
-        n_errata=sum(len(c.errata) for c in comparisons), n_slips=len({e.slip for c in comparisons for _, e in c.errata}),
-        remarks=[_remark(c, remark) for c in comparisons for remark in c.remarks], printed=PRINTED,
-        columns=[(v.name.lower(), text) for v, text in COLUMNS.items()],
-        counts={v.name.lower(): comparisons.counts[v] for v in Verdict}, total=sum(comparisons.counts.values()),
-        proved=comparisons.proved, decided=sum(comparisons.counts[v] for v in PROVABLE))
+    summary = Summary(_counts(comparisons.counts), sum(comparisons.counts.values()), comparisons.proved,
+                      sum(comparisons.counts[v] for v in PROVABLE), sum(len(c.errata) for c in comparisons),
+                      len({e.slip for c in comparisons for _, e in c.errata}), PRINTED)
+    context: NamedRecords
+    if name.startswith("errata"):
+        context = ErrataContext(summary, _slips(comparisons, pages, ending == "html"),
+                                tuple(_remark(c, remark) for c in comparisons for remark in c.remarks))
+    else:
+        context = ComparisonContext(summary, tuple(_case(c, pages) for c in comparisons))
+    return environment.get_template(f"report/{name}.jinja").render(context.names())
+
+
+def _counts(of: Mapping[Verdict, int]) -> tuple[OfVerdict, ...]:
+    return tuple(OfVerdict(v.name.lower(), text, of[v]) for v, text in COLUMNS.items())
 
 
 @dataclass(frozen=True)
@@ -87,8 +219,8 @@ class Pages:
     typeset: Callable[[str], Any]
     color: str
 
-    def lines(self, room: float, value: Any, wrong: Places = (), left: str = "") -> list[Any]:
-        return [self.typeset(line) for line in Lines(room, self.color).of(value, wrong, left)]
+    def lines(self, room: float, value: Any, wrong: Places = (), left: str = "") -> tuple[Any, ...]:
+        return tuple(self.typeset(line) for line in Lines(room, self.color).of(value, wrong, left))
 
 
 def _safe(text: str) -> Any:
@@ -97,49 +229,46 @@ def _safe(text: str) -> Any:
     return Markup(text)  # made by latex2mathml, which escapes what it is given
 
 
-def _case(case: Comparison, pages: Pages) -> dict[str, Any]:
-    return {"name": case.name, "title": case.title, "section": case.slide.section if case.slide else "",
-            "counts": {v.name.lower(): case.counts[v] for v in Verdict},
-            "formulas": [_formula(f, pages) for f in case.formulas]}
+def _case(case: Comparison, pages: Pages) -> CaseShown:
+    return CaseShown(case.name, case.title, case.slide.section if case.slide else "", _counts(case.counts),
+                     tuple(_formula(f, pages) for f in case.formulas))
 
 
-def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
+def _formula(formula: FormulaResult, pages: Pages) -> FormulaShown:
     name = formula.latex or ""
     printed = width(formula.printed) + letters(f"{name} = ") if formula.printed is not None else 0
     derived = width(formula.derived) if formula.derived is not None else 0
     where = max(map(letters, where_latex(formula)), default=0)
     wide = max(printed, derived, where) > COLUMN
     room = PAGE if wide else COLUMN
-    notes = list(dict.fromkeys(": ".join(filter(None, (place(formula, e.index), e.note))) if e.verdict is Verdict.UNREADABLE
+    notes = tuple(dict.fromkeys(": ".join(filter(None, (place(formula, e.index), e.note))) if e.verdict is Verdict.UNREADABLE
                                else e.note for e in formula.entries if e.note))
     ways = list(dict.fromkeys(e.how for e in formula.entries if e.how))
-    return {"name": formula.name, "slide": str(formula.slide), "also": ", ".join(map(str, formula.also)), "wide": wide,
-            "verdict": formula.verdict.name.lower(),
-            "summary": "; ".join(words if len(formula.entries) > 1 else words.removeprefix("1 ")
-                                 for _, words in worded(formula.entries)),
-            "printed": pages.lines(room, formula.printed, marked(formula), name) if formula.printed is not None
-            else [pages.typeset(name)] if name else [],
-            "derived": pages.lines(room, formula.derived) if formula.derived is not None else [],
-            "where": [pages.typeset(line) for line in where_lines(formula, room)], "notes": notes,
-            "ways": ", ".join([*ways, "on the named states"] if formula.where and ways else ways),
-            "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
+    summary = "; ".join(words if len(formula.entries) > 1 else words.removeprefix("1 ") for _, words in worded(formula.entries))
+    letters_alone = (pages.typeset(name),) if name else ()
+    return FormulaShown(
+        formula.name, str(formula.slide), ", ".join(map(str, formula.also)), wide, formula.verdict.name.lower(), summary,
+        pages.lines(room, formula.printed, marked(formula), name) if formula.printed is not None else letters_alone,
+        pages.lines(room, formula.derived) if formula.derived is not None else (),
+        tuple(pages.typeset(line) for line in where_lines(formula, room)), notes,
+        ", ".join([*ways, "on the named states"] if formula.where and ways else ways),
+        tuple(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds)))
 
 
-def _slips(comparisons: Comparisons, pages: Pages, broken: bool) -> list[dict[str, Any]]:
+def _slips(comparisons: Comparisons, pages: Pages, broken: bool) -> tuple[Slip, ...]:
     """The errata of all cases, those that repeat one slip together, at the place of the first."""
-    result: dict[str, list[dict[str, Any]]] = {}
+    result: dict[str, list[ErratumShown]] = {}
     for case in comparisons:
         for erratum in _errata(case, pages, broken):
-            result.setdefault(erratum["slip"], []).append(erratum)
-    return [{"sentence": slip, "errata": errata} for slip, errata in result.items()]
+            result.setdefault(erratum.slip, []).append(erratum)
+    return tuple(Slip(slip, tuple(errata)) for slip, errata in result.items())
 
 
-def _remark(case: Comparison, remark: Remark) -> dict[str, Any]:
-    return {"why": remark.why, "line": remark.line, "also": ", ".join(map(str, remark.also)), "case": case.name,
-            "section": case.slide.section if case.slide else ""}
+def _remark(case: Comparison, remark: Remark) -> RemarkShown:
+    return RemarkShown(remark.why, remark.line, ", ".join(map(str, remark.also)), case.name)
 
 
-def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]]:
+def _errata(case: Comparison, pages: Pages, broken: bool) -> list[ErratumShown]:
     """broken: formulas are lists of lines that fit the page, otherwise one line each."""
     rows = []
     for formula, erratum in case.errata:
@@ -148,17 +277,13 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
         room = ERRATA_PAGE if wide else ERRATA_COLUMN
         slide = f"{formula.slide.section} {formula.slide.title}".strip()
         letters = formula.latex or ""
-        rows.append({"case": case.name, "formula": formula.name,
-                     "latex": [pages.typeset(letters)] if broken and letters else letters,
-                     "slide": slide or case.title or case.name, "why": erratum.why, "slip": erratum.slip,
-                     "line": formula.slide.line, "also": ", ".join(map(str, formula.also)), "wide": wide,
-                     "kind": evidence.kind, "sentence": evidence.sentence.rstrip(".") + ".",
-                     "printed_residual": f"{evidence.printed:.2g}", "right_residual": _rounding(evidence.right),
-                     "more": max(len(erratum.entries) - SHOWN, 0) if not isinstance(formula.printed, tuple) else 0,
-                     "corrections": [{"place": c.place,
-                                      "printed": pages.lines(room, c.printed, c.wrong) if broken else formula_latex(c.printed),
-                                      "right": pages.lines(room, c.right) if broken else formula_latex(c.right)}
-                                     for c in result]})
+        more = max(len(erratum.entries) - SHOWN, 0) if not isinstance(formula.printed, tuple) else 0
+        rows.append(ErratumShown(
+            case.name, formula.name, (pages.typeset(letters),) if broken and letters else letters,
+            slide or case.title or case.name, erratum.why, erratum.slip, formula.slide.line, ", ".join(map(str, formula.also)),
+            wide, evidence.kind, evidence.sentence.rstrip(".") + ".", f"{evidence.printed:.2g}", _rounding(evidence.right), more,
+            tuple(CorrectionShown(c.place, pages.lines(room, c.printed, c.wrong) if broken else formula_latex(c.printed),
+                                  pages.lines(room, c.right) if broken else formula_latex(c.right)) for c in result)))
     return rows
 
 

@@ -49,6 +49,25 @@ class Quantity:
     legend: str = ""
 
 
+@dataclass(frozen=True)
+class SymbolRow:
+    """A symbol: as HTML, in code, its unit and its number."""
+
+    symbol: str
+    code: str
+    unit: str
+    value: str
+
+
+@dataclass(frozen=True)
+class SymbolTable:
+    """Symbols of a kind; what: the meaning of their numbers."""
+
+    title: str
+    what: str
+    rows: tuple[SymbolRow, ...]
+
+
 def written_out(equations: Equations, name: str) -> int:
     """Operations of a quantity as explicit expressions, where nothing is shared."""
     tape = equations.tape(name)
@@ -68,26 +87,26 @@ def form(equations: Equations) -> str:
             r",\quad \mathbf{C}_{\mathbf{r}}\,\dot{\mathbf{u}} = \mathbf{F}^{d},\quad \mathbf{C} = \mathbf{0}")
 
 
-def symbols(equations: Equations) -> list[dict[str, Any]]:
-    """Tables of symbols: title, rows of (symbol as HTML, code name, unit, number)."""
+def symbols(equations: Equations) -> tuple[SymbolTable, ...]:
+    """Tables of the symbols that there are."""
     s, typeset = equations.symbols, typesetter()
     tables = []
     for title, group, numbers, what in (
             ("Coordinates q", s.coordinates, s.initial, "start"), ("Speeds u", s.speeds, s.initial, "start"),
             ("Extra states z", s.states, s.initial, "start"), ("Inputs", s.inputs, s.initial, "start"),
             ("Parameters", s.parameters, s.defaults, "default")):
-        rows = [(typeset(_latex(x)), x.name, s.units.get(x, ""), _number(numbers.get(x, None if what == "default" else 0.0)))
-                for x in group]
+        rows = tuple(SymbolRow(typeset(_latex(x)), x.name, s.units.get(x, ""),
+                               _number(numbers.get(x, None if what == "default" else 0.0))) for x in group)
         if rows:
-            tables.append({"title": title, "what": what, "rows": rows})
-    return tables
+            tables.append(SymbolTable(title, what, rows))
+    return tuple(tables)
 
 
-def quantities(equations: Equations) -> list[Quantity]:
+def quantities(equations: Equations) -> tuple[Quantity, ...]:
     """The matrices of the equations of motion, with constraints also theirs."""
     typeset = typesetter()
     names = (*USUAL, *OF_CONSTRAINTS * bool(equations.constraints))
-    return [_quantity(equations, name, typeset) for name in names if name in equations.quantities]
+    return tuple(_quantity(equations, name, typeset) for name in names if name in equations.quantities)
 
 
 def _quantity(equations: Equations, name: str, typeset: Callable[[str], str]) -> Quantity:

@@ -7,11 +7,9 @@ A part that cannot be made becomes a paragraph that reports it; the page is writ
 from __future__ import annotations
 
 import math
-import time as clock
 import traceback
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,18 +22,34 @@ from symdyn.overview import condition as full_condition
 from symdyn.overview import equations as full_equations
 from symdyn.overview import pictures as full_pictures
 from symdyn.overview import work as full_work
-from symdyn.pages import page_environment, write_text
+from symdyn.overview.context import (
+    FullContext,
+    FunctionRow,
+    IdentityRow,
+    Mechanism,
+    OfCode,
+    OfCondition,
+    OfEquations,
+    OfProof,
+    OfStress,
+    OfWork,
+    Part,
+    Parts,
+    RangeRow,
+    Shown,
+)
+from symdyn.pages import filled, write_text
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.solutions.tables import facts
 from symdyn.shown import shown
 from symdyn.stress.flow import stands_still
-from symdyn.stress.record import number
+from symdyn.stress.page import finding
 from symdyn.stress.run import stress
 from symdyn.stress.system_under_test import SystemUnderTest, named
 
 if TYPE_CHECKING:
     from symdyn.given import PathName
-    from symdyn.report.text import Report
+    from symdyn.report.text import Report, Row
 
 BUDGET = 20.0
 # Warnings of parts are reported in them, so many of each.
@@ -100,111 +114,106 @@ def _equations(system: Any, formulation: str, coordinates: str, tune: bool) -> E
     return formulated(system, formulation, tune, coordinates)
 
 
-@dataclass
-class Part:
-    """A part of the page: what it shows, or why there is nothing; notes: what is missing in it."""
-
-    title: str
-    shown: dict[str, Any] = field(default_factory=dict)
-    failed: str = ""
-    notes: list[str] = field(default_factory=list)
-    seconds: float = 0.0
-
-
 def page(equations: Equations, system: Any, formulation: str, budget: float, verify: bool, log: Log) -> str:
     """The text of the page.
 
     system        what sd.bench takes; formulation: the equations' as it names them, empty where it takes equations
     """
     tested = SystemUnderTest(equations)
-    makers: dict[str, tuple[str, Callable[[Part], None]]] = {
-        "equations": ("Equations of motion", lambda part: _show_equations(part, equations)),
-        "generated": ("Generated code", lambda part: _show_generated(part, equations)),
-        "condition": ("Condition along the motion", lambda part: _show_condition(part, tested)),
-        "work": ("Work against error", lambda part: _show_work(part, system, formulation, budget, log)),
-        "stress": ("Stability under stress", lambda part: _show_stress(part, tested))}
-    if verify:
-        makers["proof"] = ("Proof by identities", lambda part: part.shown.update(result=equations.verify()))
-    parts = {key: _made(title, make, log) for key, (title, make) in makers.items()}
-    environment = page_environment()
-    environment.filters["number"] = number
-    return environment.get_template("report/full.html.jinja").render(
-        name=equations.name, version=symdyn.__version__, formulation=equations.formulation, frames=equations.frames, parts=parts,
-        budget=f"{budget:g}")
+    parts = Parts(
+        _made("Equations of motion", lambda notes: _equations_shown(equations, notes), log),
+        _made("Generated code", lambda notes: _code(equations), log),
+        _made("Condition along the motion", lambda notes: _condition(tested, notes), log),
+        _made("Work against error", lambda notes: _work(system, formulation, budget, log, notes), log),
+        _made("Stability under stress", lambda notes: _stress(tested), log),
+        _made("Proof by identities", lambda notes: _proof(equations), log) if verify else None)
+    mechanism = Mechanism(equations.name, equations.formulation, symdyn.__version__, f"{budget:g}")
+    return filled("report/full.html.jinja", FullContext(mechanism, parts))
 
 
-def _made(title: str, make: Callable[[Part], None], log: Log) -> Part:
-    """A part; whatever goes wrong in making it is reported in it."""
-    part, begun = Part(title), clock.perf_counter()
-    log(title[0].lower() + title[1:])
+def _made(title: str, make: Callable[[list[str]], Shown], log: Log) -> Part[Shown]:
+    """A part, in which failures of making it are reported; make: gives what it shows, with a list that takes notes."""
+    stage, failed, made = title[0].lower() + title[1:], "", None
+    notes: list[str] = []
+    log(stage)
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            make(part)
-        part.notes += list(dict.fromkeys(f"Warning: {w.message}" for w in caught if issubclass(w.category, WARNINGS)))[:MOST]
+            made = make(notes)
+        notes += list(dict.fromkeys(f"Warning: {w.message}" for w in caught if issubclass(w.category, WARNINGS)))[:MOST]
     except (SymdynError, ImportError, OSError) as error:
-        part.failed = str(error)
+        failed = str(error)
     except Exception as error:  # of one part; the others must not be lost with it
         last = traceback.extract_tb(error.__traceback__)[-1]
-        part.failed = f"{type(error).__name__} in {Path(last.filename).name}:{last.lineno}: {error}"
-    if part.failed:
-        log(f"{title[0].lower() + title[1:]}: not made: {part.failed}")
-    part.seconds = clock.perf_counter() - begun
-    return part
+        failed = f"{type(error).__name__} in {Path(last.filename).name}:{last.lineno}: {error}"
+    if failed:
+        log(f"{stage}: not made: {failed}")
+    return Part(title, made, failed, tuple(notes))
 
 
-def _noted(part: Part, make: Callable[[], Any], missing: Any) -> Any:
+def _noted(notes: list[str], make: Callable[[], Any], missing: Any) -> Any:
     """Content that may be left out of a part, with a note."""
     try:
         return make()
     except MissingExtra as error:
-        if str(error) not in part.notes:
-            part.notes.append(str(error))
+        if str(error) not in notes:
+            notes.append(str(error))
         return missing
 
 
-def _show_equations(part: Part, equations: Equations) -> None:
-    _noted(part, lambda: full_equations.mathml("x"), "")
-    part.shown = {"form": full_equations.typesetter()(full_equations.form(equations)),
-                  "symbols": full_equations.symbols(equations), "quantities": full_equations.quantities(equations),
-                  "constraints": equations.constraints}
+def _equations_shown(equations: Equations, notes: list[str]) -> OfEquations:
+    _noted(notes, lambda: full_equations.mathml("x"), "")
+    return OfEquations(full_equations.typesetter()(full_equations.form(equations)), full_equations.symbols(equations),
+                       full_equations.quantities(equations), tuple(equations.constraints))
 
 
-def _show_generated(part: Part, equations: Equations) -> None:
-    module = equations.compile()
-    report: Report = module.report()
-    part.shown = {"report": report, "candidates": report.candidates, "backend": report.backend, "fallback": report.fallback}
+def _code(equations: Equations) -> OfCode:
+    report: Report = equations.compile().report()
+    return OfCode(report.backend, report.fallback, tuple((what, n) for what, n in report.sizes.items() if n),
+                  tuple(_function(row) for row in report.rows), report.candidates, report.skipped, report.many)
 
 
-def _show_condition(part: Part, tested: SystemUnderTest) -> None:
+def _function(row: Row) -> FunctionRow:
+    add, multiply, divide, sin_cos = (row.operations.get(kind, 0) for kind in ("add", "mul", "div", "trig"))
+    return FunctionRow(row.function, row.total, add, multiply, divide, sin_cos, row.total - add - multiply - divide - sin_cos,
+                       row.prologue, row.chain)
+
+
+def _condition(tested: SystemUnderTest, notes: list[str]) -> OfCondition:
     result = full_condition.along(tested)
-    if len(result.solution.t) and stands_still(tested, result.solution.x):
-        part.notes.append(STILL)
-    part.shown = {"found": result, "curves": [_range(label, values) for label, values in result.curves.items()],
-                  "states": len(result.t), "end": f"{result.solution.t[-1]:g}" if len(result.solution.t) else "0",
-                  "facts": facts(result.solution),
-                  "picture": _noted(part, lambda: full_condition.picture(result), "") if result.curves else "",
-                  "mechanism": _noted(part, lambda: full_pictures.mechanism(result.solution), [])}
+    times = result.solution.t
+    if len(times) and stands_still(tested, result.solution.x):
+        notes.append(STILL)
+    picture = _noted(notes, lambda: full_condition.picture(result), "") if result.curves else ""
+    mechanism = _noted(notes, lambda: full_pictures.mechanism(result.solution), ())
+    return OfCondition(len(result.t), f"{times[-1]:g}" if len(times) else "0", result.near, result.warnings, result.passages,
+                       tuple(_range(label, values) for label, values in result.curves.items()), picture, mechanism,
+                       tuple(facts(result.solution)))
 
 
-def _range(label: str, values: Any) -> dict[str, str]:
+def _range(label: str, values: Any) -> RangeRow:
     finite = [float(v) for v in values if math.isfinite(v)]
-    return {"label": label, "least": f"{min(finite, default=math.nan):.3g}",
-            "most": f"{max(finite, default=math.nan):.3g}",
-            "lost": str(len(values) - len(finite)) if len(values) > len(finite) else ""}
+    return RangeRow(label, f"{min(finite, default=math.nan):.3g}", f"{max(finite, default=math.nan):.3g}",
+                    str(len(values) - len(finite)) if len(values) > len(finite) else "")
 
 
-def _show_work(part: Part, system: Any, formulation: str, budget: float, log: Log) -> None:
+def _work(system: Any, formulation: str, budget: float, log: Log, notes: list[str]) -> OfWork:
     benchmarks = full_work.measure(system, formulation, budget, log)
-    part.notes += dict.fromkeys(f"{note[0].upper()}{note[1:]}." for benchmark in benchmarks for note in benchmark.notes)
-    part.shown = full_work.shown(benchmarks)
-    if part.shown["note"]:
-        part.notes.append(part.shown["note"])
+    notes += dict.fromkeys(f"{note[0].upper()}{note[1:]}." for benchmark in benchmarks for note in benchmark.notes)
+    return full_work.shown(benchmarks, notes)
 
 
-def _show_stress(part: Part, tested: SystemUnderTest) -> None:
+def _stress(tested: SystemUnderTest) -> OfStress:
     tested.module.parameters()  # without numbers no check could begin
     report = stress(tested, short=True)
     order = {"fail": 0, "degrade": 1, "pass": 2}
-    part.shown = {"rows": sorted(report.rows, key=lambda row: order[row.verdict]), "left_out": report.left_out,
-                  "summary": report.summary(), "passed": report.passed}
+    return OfStress(tuple(finding(row) for row in sorted(report.rows, key=lambda row: order[row.verdict])),
+                    tuple(report.left_out), report.summary(), report.passed)
+
+
+def _proof(equations: Equations) -> OfProof:
+    result = equations.verify()
+    verdicts = {True: "pass", False: "fail", None: "–"}
+    return OfProof(result.passed, result.states, result.note, tuple(
+        IdentityRow(verdicts[check.passed], check.name, "–" if check.residual is None else f"{check.residual:.1e}",
+                    f"{check.tolerance:.0e}", check.remark) for check in result.checks))

@@ -14,6 +14,7 @@ from symdyn.runtime.building.compiler import find_compiler
 
 if TYPE_CHECKING:
     from symdyn.bench.work.benchmark import Benchmark
+    from symdyn.overview.context import OfWork
 
 TOLERANCES = tuple(10.0**-k for k in (3, 5, 7, 9, 11, 13, 15))
 REPEATS = 3
@@ -85,18 +86,19 @@ def merged(first: Benchmark, second: Benchmark) -> Benchmark:
                    skipped=list(dict.fromkeys([*first.skipped, *second.skipped])))
 
 
-def shown(benchmarks: Sequence[Benchmark]) -> dict[str, Any]:
-    """Content of the page: `parts` with pictures, or tables as text where these cannot be drawn."""
+def shown(benchmarks: Sequence[Benchmark], notes: list[str]) -> OfWork:
+    """Content of the page: with pictures, or tables as text where these cannot be drawn, of which notes then tell."""
     from symdyn.bench.work.page import part
     from symdyn.bench.work.picture import write_pictures
+    from symdyn.overview.context import OfWork
 
     with tempfile.TemporaryDirectory() as folder:
         try:
             parts = []
             for benchmark in benchmarks:
                 drawn = next(path for path in write_pictures(benchmark, Path(folder)) if path.suffix == ".svg")
-                parts.append({**part(benchmark, drawn),
-                              "methods": list(dict.fromkeys(row.method for row in benchmark.rows))})
-            return {"parts": parts, "text": "", "note": ""}
+                parts.append(part(benchmark, drawn))
+            return OfWork(tuple(parts), "")
         except MissingExtra as missing:
-            return {"parts": [], "text": "\n\n".join(b.table() for b in benchmarks), "note": str(missing)}
+            notes.append(str(missing))
+            return OfWork((), "\n\n".join(b.table() for b in benchmarks))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,29 +27,42 @@ _MANY = 200_000
 _FLATTENS, _NOTHING = 15.0, 1e-7
 
 
-def mechanism(solution: Solution, times: Sequence[tuple[str, float]]) -> list[dict[str, str]]:
-    """The mechanism at named times, and its way: pictures with `source`, `title` and `text`; none if nothing can be drawn."""
+@dataclass(frozen=True)
+class Embedded:
+    """A picture that a page holds.
+
+    source   address of the <img>; title, text: what it shows
+    """
+
+    source: str
+    title: str
+    text: str = ""
+
+
+def mechanism(solution: Solution, times: Sequence[tuple[str, float]]) -> tuple[Embedded, ...]:
+    """The mechanism at named times, and its way; none if nothing can be drawn."""
     drawing = Drawing.of(solution) if len(solution.t) else None
     if drawing is None:
-        return []
+        return ()
     result = []
     there = drawing.at(solution.t, np.array([t for _, t in times])) if len(solution.t) > 1 else drawing
     for k, (title, t) in enumerate(times):
         figure = _square(drawing)
         show(make_artists(make_axes(figure, 111, drawing), there), there, k)
-        result.append({"source": _source(figure, tight=True), "title": title, "text": f"t = {t:.5g} s"})
+        result.append(Embedded(_source(figure, tight=True), title, f"t = {t:.5g} s"))
     if len(solution.t) > 1:
         figure = _square(drawing)
         draw_path(figure, 111, drawing)
         text = figure.axes[0].get_title()
         figure.axes[0].set_title("")
-        result.append({"source": _source(figure, tight=True), "title": "motion", "text": text})
-    return result
+        result.append(Embedded(_source(figure, tight=True), "motion", text))
+    return tuple(result)
 
 
-def curves(solution: Solution) -> list[dict[str, str]]:
-    """Curves over time, one picture for each unit: `source`, `title`."""
-    return [_curves(solution.t, part) for panel in panels_of(solution) for part in _apart(panel)] if len(solution.t) else []
+def curves(solution: Solution) -> tuple[Embedded, ...]:
+    """Curves over time, one picture for each unit."""
+    panels = panels_of(solution) if len(solution.t) else []
+    return tuple(_curves(solution.t, part) for panel in panels for part in _apart(panel))
 
 
 def _apart(panel: Panel) -> list[Panel]:
@@ -62,15 +76,15 @@ def _apart(panel: Panel) -> list[Panel]:
     return [take(panel, np.flatnonzero(mask).tolist(), panel.part) for mask in (~large, large)]
 
 
-def balance(solution: Solution, rows: np.ndarray) -> list[dict[str, str]]:
+def balance(solution: Solution, rows: np.ndarray) -> tuple[Embedded, ...]:
     """Work of the loads with what resets of events add, and change of energy, (n_t, 2), and their difference over time."""
     added = "work of loads and resets" if solution.reset_energy else "work of loads"
     less = f"{added.replace(' of loads', '')} \N{MINUS SIGN} change"
-    return [_curves(solution.t, Panel("energy", "J", [added, "change"], rows, [added, "change"])),
-            _curves(solution.t, Panel("", "J", [less], rows[:, :1] - rows[:, 1:], [less]), small=True)]
+    return (_curves(solution.t, Panel("energy", "J", [added, "change"], rows, [added, "change"])),
+            _curves(solution.t, Panel("", "J", [less], rows[:, :1] - rows[:, 1:], [less]), small=True))
 
 
-def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> dict[str, str]:
+def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> Embedded:
     figure = Picture(figsize=(6.2, 2.6), layout="constrained")
     axes: Any = figure.add_subplot(111)
     draw_panel(axes, t, panel)
@@ -78,7 +92,7 @@ def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> dict[str, str]:
         axes.autoscale(axis="y")
     axes.set_xlabel("t [s]")
     title = f"{panel.title}: {', '.join(panel.names)}" if panel.title else panel.names[0]
-    return {"source": _source(figure, "png" if panel.values.size > _MANY else "svg"), "title": title.replace("\n", " ")}
+    return Embedded(_source(figure, "png" if panel.values.size > _MANY else "svg"), title.replace("\n", " "))
 
 
 def _square(drawing: Drawing) -> Figure:

@@ -12,7 +12,6 @@ from typing import Any
 
 import symdyn
 from symdyn.arguments import some
-from symdyn.backend.context import NamedRecords
 from symdyn.backend.metadata import Sizes
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import CORRECTIONS, render, template_environment
@@ -23,6 +22,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.functions.content import content_of
 from symdyn.functions.tapes import has_function
 from symdyn.kinds import flag
+from symdyn.named_records import NamedRecords
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.paths import as_path, writing
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from symdyn.backend.context import NamedRecords
 from symdyn.backend.metadata import EventRecord
+from symdyn.named_records import NamedRecords
 from symdyn.targets.fmu_description import FmuUnit, Unknown, Variable
 
 # The elements of the description in version 2, by kind.

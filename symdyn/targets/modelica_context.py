@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from symdyn.backend.context import Algorithms, NamedRecords
+from symdyn.backend.context import Algorithms
 from symdyn.backend.function import Section
 from symdyn.backend.user_functions import UserText
+from symdyn.named_records import NamedRecords
 
 
 @dataclass(frozen=True)

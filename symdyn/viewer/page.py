@@ -11,7 +11,8 @@ from typing import Any
 
 from symdyn.errors import ArgumentError
 from symdyn.folders import templates_folder
-from symdyn.pages import page_environment, write_text
+from symdyn.named_records import NamedRecords
+from symdyn.pages import filled, write_text
 from symdyn.runtime.paths import as_path
 
 # Scripts of the page, in the order in which its parts need each other.
@@ -52,6 +53,36 @@ class View:
         return f"View({self.name!r})" if self.path is None else f"View({self.name!r}, path={str(self.path)!r})"
 
 
+@dataclass(frozen=True)
+class Shown:
+    """The scene that the page shows.
+
+    name        of the mechanism
+    functions   kinematics in JavaScript
+    data        the scene, as JSON that a script may hold
+    """
+
+    name: str
+    functions: str
+    data: str
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """The means of showing it: the style of the page, the script that draws."""
+
+    style: str
+    script: str
+
+
+@dataclass(frozen=True)
+class ViewContext(NamedRecords):
+    """The records that the page of a view gets."""
+
+    shown: Shown
+    renderer: Renderer
+
+
 def page_of(name: str, data: dict[str, Any], functions: str, path: Any) -> View:
     """The page of a scene; functions: kinematics in JavaScript; written to a path if one is given."""
     target = None if path is None else _target(path)
@@ -62,9 +93,8 @@ def page_of(name: str, data: dict[str, Any], functions: str, path: Any) -> View:
     except ValueError:
         raise ArgumentError(f"{name}: lengths of the picture are beyond the range of double precision; pass smaller numbers for "
                             "coordinates and parameters") from None
-    text = page_environment().get_template("viewer/page.html.jinja").render(
-        name=name, style=(folder / "style.css").read_text(encoding="utf-8"), script=script, functions=functions,
-        data=plain)
+    renderer = Renderer((folder / "style.css").read_text(encoding="utf-8"), script)
+    text = filled("viewer/page.html.jinja", ViewContext(Shown(name, functions, plain), renderer))
     made = View(name, text, target)
     if target is not None:
         made.save(target)

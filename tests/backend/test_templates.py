@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symdyn.backend.context import Algorithms, Calls, Context, Integrator, Manifold, Model, NamedRecords, Needs, Options
+from symdyn.backend.context import Algorithms, Calls, Context, Integrator, Manifold, Model, Needs, Options
 from symdyn.backend.dialect import identifier
 from symdyn.backend.function import Function
 from symdyn.backend.program import Program
@@ -24,6 +24,7 @@ from symdyn.backend.source import backends, template_folders
 from symdyn.errors import CompilerWarning, SymdynError
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
+from symdyn.named_records import NamedRecords
 from symdyn.pipeline import emit, write_source
 from symdyn.targets import fmu
 from symdyn.targets.cmake import Package, PackageContext, Stack

@@ -24,6 +24,7 @@ from symdyn.overview import equations as full_equations
 from symdyn.overview import page as full
 from symdyn.overview import pictures as full_pictures
 from symdyn.overview import work as full_work
+from symdyn.overview.context import OfCondition, OfWork
 from symdyn.overview.page import full_report
 from symdyn.report.notation import entry_latex, name_latex
 from symdyn.runtime.integrating.charts import distances
@@ -88,11 +89,9 @@ def text(written: tuple[Path, list[str]]) -> str:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of text alone."""
     monkeypatch.setattr(full, "stress", lambda tested, short: StressReport())
-    monkeypatch.setattr(full, "_show_condition", lambda part, tested: part.shown.update(
-        found=SimpleNamespace(warnings=(), passages=(), near=False),
-        curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
-    monkeypatch.setattr(full_work, "measure", lambda *arguments: None)
-    monkeypatch.setattr(full_work, "shown", lambda benchmark: {"parts": [], "text": "a table", "note": ""})
+    monkeypatch.setattr(full, "_condition", lambda tested, notes: OfCondition(0, "0", False, (), (), (), "", (), ()))
+    monkeypatch.setattr(full_work, "measure", lambda *arguments: [])
+    monkeypatch.setattr(full_work, "shown", lambda benchmarks, notes: OfWork((), "a table"))
 
 
 def test_every_part_is_there(text: str, written: tuple[Path, list[str]]) -> None:
@@ -237,7 +236,7 @@ def test_a_part_that_fails_is_reported_and_loses_nothing(quick: None, tmp_path: 
 
     monkeypatch.setattr(full_work, "measure", named)
     monkeypatch.setattr(full, "stress", crash)
-    monkeypatch.setattr(full, "_show_condition", crash)
+    monkeypatch.setattr(full, "_condition", crash)
     told: list[str] = []
     page = full_report("pendulum", tmp_path / "page.html", log=told.append).read_text(encoding="utf-8")
     assert "This part could not be made: nothing can be measured &lt;here&gt;" in section(page, "work")

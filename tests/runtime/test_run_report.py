@@ -60,7 +60,7 @@ def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of text alone, which take less time."""
     for name in ("mechanism", "curves", "balance"):
-        monkeypatch.setattr(embedded, name, lambda *arguments: [])
+        monkeypatch.setattr(embedded, name, lambda *arguments: ())
 
 
 def rows(text: str, section: str) -> list[list[str]]:
@@ -106,8 +106,8 @@ def test_means_do_not_depend_on_where_the_steps_are(module: Module) -> None:
     """F = 2 sin t over its period has the mean 0 and the deviation sqrt 2, however the times lie."""
     t = 2 * np.pi * np.linspace(0, 1, 4001)**3
     solution = module.simulate(t, inputs={"F": lambda t, x: 2 * np.sin(t)}, rtol=1e-3)
-    (row,) = [r for r in run_tables.extremes(solution) if r["name"] == "F"]
-    assert abs(value(row["mean"])) < 1e-5 and value(row["deviation"]) == pytest.approx(np.sqrt(2), abs=1e-5)
+    (row,) = [r for r in run_tables.extremes(solution) if r.name == "F"]
+    assert abs(value(row.mean)) < 1e-5 and value(row.deviation) == pytest.approx(np.sqrt(2), abs=1e-5)
 
 
 def test_changed_parameters_are_marked(report: Path, solution: Solution) -> None:
@@ -160,7 +160,7 @@ def test_a_run_that_stopped_early_is_reported_and_text_is_escaped(module: Module
 def test_without_anything_to_show_there_are_no_pictures(module: Module) -> None:
     empty = module.simulate((0.0, 0.01), rtol=1e-2)
     empty.t, empty.x = empty.t[:0], empty.x[:0]
-    assert embedded.mechanism(empty, []) == embedded.curves(empty) == []
+    assert embedded.mechanism(empty, []) == embedded.curves(empty) == ()
 
 
 def test_the_mechanism_is_shown_where_it_is_farthest_from_the_start() -> None:
@@ -201,10 +201,10 @@ def test_validity_checks_are_listed() -> None:
     module = SimpleNamespace(metadata=SimpleNamespace(validity_checks=ranges), functions=("validity_checks",))
     run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values, module=module)
     draft, tilt, creep = run_tables.validity_checks(run)
-    assert draft["outside"] and draft["message"] == "the box leaves the water at a draft of 0.5 m"
-    assert (draft["least"], draft["most"], draft["limits"]) == ("0.5", "4", "from 1 to 9")
-    assert not tilt["outside"] and not tilt["message"] and tilt["limits"] == "to 0.3"
-    assert creep["outside"] and creep["message"] == "it creeps 5 m" and creep["least"] == creep["most"] == "5"
+    assert draft.outside and draft.message == "the box leaves the water at a draft of 0.5 m"
+    assert (draft.least, draft.most, draft.limits) == ("0.5", "4", "from 1 to 9")
+    assert not tilt.outside and not tilt.message and tilt.limits == "to 0.3"
+    assert creep.outside and creep.message == "it creeps 5 m" and creep.least == creep.most == "5"
 
 
 def test_curves_that_would_flatten_others_have_axes_of_their_own() -> None:

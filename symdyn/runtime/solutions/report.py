@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,15 +10,95 @@ import numpy as np
 
 import symdyn
 from symdyn.errors import ArgumentError
-from symdyn.pages import page_environment, write_text
+from symdyn.named_records import NamedRecords
+from symdyn.pages import filled, write_text
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.solutions import tables as run_tables
 
 if TYPE_CHECKING:
+    from symdyn.pictures.embedded import Embedded
     from symdyn.runtime.solutions.solution import Solution
 
 # Smaller motion, relative to the mechanism, is not seen in a picture.
 _SEEN = 1e-3
+
+
+@dataclass(frozen=True)
+class Run:
+    """The run as a whole.
+
+    name       of the mechanism; version: of symdyn
+    success    whether it reached its end; message: how it ended
+    fallback   why it ran on NumPy, "" if it did not have to
+    facts      pairs of title and text
+    generated  the report of the module, "" if it was loaded from files
+    """
+
+    name: str
+    version: str
+    success: bool
+    message: str
+    fallback: str
+    facts: tuple[tuple[str, str], ...]
+    generated: str
+
+
+@dataclass(frozen=True)
+class Given:
+    """Parameters of the run, and its start."""
+
+    parameters: tuple[run_tables.ParameterRow, ...]
+    start: tuple[run_tables.StartRow, ...]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion: pictures of the mechanism, curves over time, extremes."""
+
+    mechanism: tuple[Embedded, ...]
+    curves: tuple[Embedded, ...]
+    extremes: tuple[run_tables.ExtremesRow, ...]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The balance of energy, as text.
+
+    resets     what resets of events added; of: what the relative difference is measured by
+    doubtful   whether that is too large; curves: pictures of the balance over time
+    """
+
+    work: str
+    resets: str
+    change: str
+    difference: str
+    relative: str
+    of: str
+    doubtful: bool
+    curves: tuple[Embedded, ...]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Laws and limits: how well they are kept.
+
+    energy   none where the balance is not known, for the reason `no_energy`
+    """
+
+    energy: Balance | None
+    no_energy: str
+    constraints: tuple[run_tables.ConstraintRow, ...]
+    validity_checks: tuple[run_tables.ValidityRow, ...]
+
+
+@dataclass(frozen=True)
+class RunContext(NamedRecords):
+    """The records that the page of a run gets."""
+
+    run: Run
+    given: Given
+    motion: Motion
+    quality: Quality
 
 
 def write_report(solution: Solution, path: Any) -> Path:
@@ -36,23 +117,25 @@ def page(solution: Solution) -> str:
     from symdyn.pictures import embedded
 
     module = solution.module
+    return filled("report/run.html.jinja", RunContext(
+        Run(module.name, symdyn.__version__, solution.success, solution.message, module.fallback,
+            tuple(run_tables.facts(solution)), _generated(solution)),
+        Given(run_tables.parameters(solution), run_tables.start(solution)),
+        Motion(embedded.mechanism(solution, _times(solution)), embedded.curves(solution), run_tables.extremes(solution)),
+        Quality(_balance(solution), _why_no_energy(solution), run_tables.constraints(solution),
+                run_tables.validity_checks(solution))))
+
+
+def _balance(solution: Solution) -> Balance | None:
+    from symdyn.pictures import embedded
+
     energy = run_tables.energy(solution)
-    return page_environment().get_template("report/run.html.jinja").render(
-        name=module.name, version=symdyn.__version__, success=solution.success, message=solution.message,
-        fallback=module.fallback, facts=run_tables.facts(solution), parameters=run_tables.parameters(solution),
-        start=run_tables.start(solution), extremes=run_tables.extremes(solution), constraints=run_tables.constraints(solution),
-        validity_checks=run_tables.validity_checks(solution), energy=_energy_table(energy), no_energy=_why_no_energy(solution),
-        mechanism=embedded.mechanism(solution, _times(solution)), curves=embedded.curves(solution),
-        balance=None if energy is None else embedded.balance(solution, energy.rows), generated=_generated(solution))
-
-
-def _energy_table(energy: run_tables.Energy | None) -> dict[str, Any] | None:
     if energy is None:
         return None
     resets = "".join(f", resets of {name} {run_tables.number(value)} J" for name, value in energy.resets.items())
-    return {"work": run_tables.number(energy.work), "resets": resets, "change": run_tables.number(energy.change),
-            "difference": f"{energy.difference:.3g}", "relative": f"{energy.relative:.2g}", "doubtful": energy.doubtful,
-            "of": "its energy: it rests" if energy.rests else "the larger of kinetic energy and range of potential energy"}
+    of = "its energy: it rests" if energy.rests else "the larger of kinetic energy and range of potential energy"
+    return Balance(run_tables.number(energy.work), resets, run_tables.number(energy.change), f"{energy.difference:.3g}",
+                   f"{energy.relative:.2g}", of, energy.doubtful, embedded.balance(solution, energy.rows))
 
 
 def _why_no_energy(solution: Solution) -> str:

@@ -37,6 +37,62 @@ class Energy:
         return not self.relative <= DOUBTFUL
 
 
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter, as text; changed: whether the value differs from the default."""
+
+    name: str
+    value: str
+    unit: str
+    default: str
+    changed: bool
+
+
+@dataclass(frozen=True)
+class StartRow:
+    """An entry of the state that the run begins with, as text."""
+
+    name: str
+    value: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class ExtremesRow:
+    """Extremes of one number over time, as text: its least and largest value with their times, mean and standard deviation."""
+
+    kind: str
+    name: str
+    unit: str
+    least: str
+    t_least: str
+    most: str
+    t_most: str
+    mean: str
+    deviation: str
+
+
+@dataclass(frozen=True)
+class ConstraintRow:
+    """The largest residual of a constraint, and of its rate, as text."""
+
+    name: str
+    position: str
+    velocity: str
+
+
+@dataclass(frozen=True)
+class ValidityRow:
+    """A value that has a range of validity, as text; outside: whether it left the range, message: the meaning of that."""
+
+    label: str
+    least: str
+    most: str
+    limits: str
+    outside: bool
+    message: str
+
+
 def number(value: Any) -> str:
     """Six digits."""
     return f"{float(value):.6g}".replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "not a number"
@@ -74,41 +130,41 @@ def unit(text: str) -> str:
     return text.replace("^2", "\N{SUPERSCRIPT TWO}").replace("^3", "\N{SUPERSCRIPT THREE}")
 
 
-def parameters(solution: Solution) -> list[dict[str, Any]]:
+def parameters(solution: Solution) -> tuple[ParameterRow, ...]:
     """Every parameter with its value, unit, default, and whether the value differs from it."""
     metadata = solution.module.metadata
     rows = []
     for name, value, default in zip(metadata.parameters, solution.params, metadata.defaults, strict=True):
         given = default if default is not None and np.isfinite(default) else None
-        rows.append({"name": name, "value": number(value), "unit": unit(metadata.units.get(name, "")),
-                     "default": "none" if given is None else number(given), "changed": given is None or float(value) != given})
-    return rows
+        rows.append(ParameterRow(name, number(value), unit(metadata.units.get(name, "")),
+                                 "none" if given is None else number(given), given is None or float(value) != given))
+    return tuple(rows)
 
 
-def start(solution: Solution) -> list[dict[str, str]]:
+def start(solution: Solution) -> tuple[StartRow, ...]:
     """The state that the run begins with."""
     if not len(solution.t):
-        return []
+        return ()
     metadata = solution.module.metadata
-    return [{"name": name, "value": number(value), "unit": unit(metadata.units.get(name, ""))}
-            for name, value in zip(metadata.x, solution.x[0], strict=True)]
+    return tuple(StartRow(name, number(value), unit(metadata.units.get(name, "")))
+                 for name, value in zip(metadata.x, solution.x[0], strict=True))
 
 
-def extremes(solution: Solution) -> list[dict[str, str]]:
+def extremes(solution: Solution) -> tuple[ExtremesRow, ...]:
     """Least and largest value with their times, mean and standard deviation over time of all coordinates, speeds, states, inputs
     and outputs."""
-    rows: list[dict[str, str]] = []
     if not len(solution.t):
-        return rows
+        return ()
+    rows = []
     for kind, name, unit, values in _curves(solution):
         if not np.isfinite(values).all():
             continue
         low, high = int(values.argmin()), int(values.argmax())
         mean = _mean(solution.t, values)
-        rows.append({"kind": kind, "name": name, "unit": unit, "least": number(values[low]), "t_least": number(solution.t[low]),
-                     "most": number(values[high]), "t_most": number(solution.t[high]), "mean": number(mean),
-                     "deviation": number(np.sqrt(_mean(solution.t, (values - mean)**2)))})
-    return rows
+        deviation = np.sqrt(_mean(solution.t, (values - mean)**2))
+        rows.append(ExtremesRow(kind, name, unit, number(values[low]), number(solution.t[low]), number(values[high]),
+                                number(solution.t[high]), number(mean), number(deviation)))
+    return tuple(rows)
 
 
 def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
@@ -150,23 +206,22 @@ def energy(solution: Solution) -> Energy | None:
                   solution.energy_scale[1], np.column_stack([change - error, change]))
 
 
-def constraints(solution: Solution) -> list[dict[str, str]]:
+def constraints(solution: Solution) -> tuple[ConstraintRow, ...]:
     """Quality of every constraint: its largest residual, relative to the mechanism's length, and of its rate."""
     names = solution.module.metadata.constraints
     if not names or not len(solution.t):
-        return []
+        return ()
     off, rate = (np.abs(rows).max(axis=0) for rows in (solution.constraint_violation, solution.velocity_violation))
-    return [{"name": name, "position": f"{a:.2g}", "velocity": f"{b:.2g}"} for name, a, b in zip(names, off, rate, strict=True)]
+    return tuple(ConstraintRow(name, f"{a:.2g}", f"{b:.2g}") for name, a, b in zip(names, off, rate, strict=True))
 
 
-def validity_checks(solution: Solution) -> list[dict[str, Any]]:
+def validity_checks(solution: Solution) -> tuple[ValidityRow, ...]:
     """Range of each value that has a range of validity, its limits, and the meaning of values outside."""
     module = solution.module
     if not module.metadata.validity_checks or not len(solution.t):
-        return []
-    return [{"label": value.label, "least": number(value.low), "most": number(value.high),
-             "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}
-            for value in checked(module, solution.rows(VALIDITY_CHECKS), solution.t)]
+        return ()
+    return tuple(ValidityRow(value.label, number(value.low), number(value.high), _limits(value.least, value.most), value.outside,
+                             value.message) for value in checked(module, solution.rows(VALIDITY_CHECKS), solution.t))
 
 
 def _limits(least: float, most: float) -> str:
