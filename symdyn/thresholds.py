@@ -40,6 +40,9 @@ CLOSE, MOST_SECANTS, MOST_HALVINGS = 4.0, 100, 100
 
 # Flights of rigid contacts shorter than so many roundings of the time are not followed.
 FLIGHT = 1e4
+# Contacts that close are hit only where their approach is faster than so many roundings of the speed that accelerations make in
+# the run.
+APPROACH = 1.0
 
 # No step begins while so many events wait; each step may add some, see `most_events`.
 WAITING = 64

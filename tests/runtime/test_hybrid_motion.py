@@ -239,7 +239,7 @@ class Switches:
 
     def draw(self) -> Any:
         """One of them, of another state with the same contacts closed, sticking and meeting, whose forces have left their bounds
-        where that has fired."""
+        where that has fired; of one in four nothing is left of the approach but rounding."""
         while True:
             one = self._near()
             values = one._values("events", one.t, one.x, one._parameters())
@@ -251,13 +251,15 @@ class Switches:
         one, middle = copy.copy(seen), seen.module.metadata.sizes.q + seen.module.metadata.sizes.u
         one.impacts, one.happened, one.doubts, one.ruled_out, one.left = [], [], {}, {}, {}
         one.modes, one.still, one.passed = seen.modes.copy(), seen.still.copy(), seen.passed.copy()
-        one.evaluators, one.latest_numbers, one.begins = {}, None, SlipBegins(2.0)
+        one.evaluators, one.latest_numbers, one.begins = {}, None, SlipBegins(one.request.span[1] - one.request.span[0])
         x = seen.x.copy()
         x[:middle] += 10.0 ** stream.uniform(-6, -0.5) * stream.normal(size=middle)
         closing = {k for k, what in one.fired if what == "closes"}
-        gaps = {k: one.normal[k] for k in one.placed if one.modes[k] != contacts.OPEN or k in closing}
-        held = [one.normal[k] for k, mode in enumerate(one.modes) if mode != contacts.OPEN and one.records[k].normal]
-        held += [row for k, still in enumerate(one.still) if still and one.modes[k] != contacts.OPEN for row in one.tangents[k]]
+        closed = {k for k, mode in enumerate(one.modes) if mode != contacts.OPEN}
+        gaps = {k: one.normal[k] for k in one.placed if k in closed | closing}
+        stopped = closed | closing if stream.uniform() < 0.25 else closed
+        held = [one.normal[k] for k in sorted(stopped) if one.records[k].normal]
+        held += [row for k, still in enumerate(one.still) if still and k in closed for row in one.tangents[k]]
         for _ in range(3):
             x = contacts.onto_rows(lambda x: one._numbers(one.t, x), x, gaps, held)
         slip, directions = one._numbers(one.t, x).slip, []

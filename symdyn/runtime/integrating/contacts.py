@@ -45,7 +45,7 @@ from symdyn.runtime.integrating.slip_ends import NOISE, NOISY, ROUNDED, SlipEnds
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.shared_forces import least_solution
 from symdyn.runtime.stronge import stronge
-from symdyn.thresholds import FLIGHT
+from symdyn.thresholds import APPROACH, FLIGHT
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -62,6 +62,8 @@ SHORTEST_FLIGHT = 1e-10
 RESOLVED_FLIGHT = FLIGHT * float(np.finfo(float).eps)
 # So is one that rises less than this part of the size of the coordinates: rounding hides when it ends.
 LOWEST_FLIGHT = 1e-12
+# An approach slower than this part of the speed that accelerations make in the run hits nothing: that much of it is rounding.
+RESOLVED_APPROACH = APPROACH * float(np.finfo(float).eps)
 # Gaps of open contacts below minus this part of that size have been missed.
 MISSED = 1e-6
 # Velocities below this part of those before an impact, or of the largest rate, are none.
@@ -77,7 +79,8 @@ STRONGE, IGNORED, COUNTS = "stronge", "ignored", "counts"
 # Energy that an impact adds counts from this part of its work on.
 GAINED = 1e-9
 CODE_OF = {mode: k for k, mode in enumerate(MODES)}
-LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, RESOLVED_FLIGHT, LOWEST_FLIGHT)
+LAWS = Laws(TOUCHING, TOGETHER, MISSED, NO_SPEED, GAINED, SHORTEST_FLIGHT, RESOLVED_FLIGHT, LOWEST_FLIGHT,
+            RESOLVED_APPROACH)
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
 # Part of the run for which a contact that has opened without a speed is near enough to count as leaving.
@@ -953,7 +956,7 @@ class _Phases:
 
     def _rounding(self, at: Numbers) -> float:
         """The speed that rounding of accelerations makes in the run, m/s, which hits nothing."""
-        return float(np.finfo(float).eps * np.abs(at.free).max(initial=0.0)) * self.begins.length
+        return float(RESOLVED_APPROACH * np.abs(at.free).max(initial=0.0)) * self.begins.length
 
     def _ignored(self, t: float, x: np.ndarray) -> list[bool]:
         return ignored(self.module, t, x, self.request.p, self.request.inputs.at(t, x[:self.request.n_state]))

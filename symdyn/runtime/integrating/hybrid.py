@@ -75,6 +75,7 @@ class Laws(NamedTuple):
     shortest_flight: float
     resolved_flight: float
     lowest_flight: float
+    resolved_approach: float
 
 
 class Done(NamedTuple):

@@ -286,6 +286,8 @@ static int symdyn_make_switch(symdyn_hybrid *h) {
         if (h->normal[k]) h->size = fmax(h->size, fabs(at.of_contact[4 * k]));
     most = symdyn_most(h->x, h->n_state);
     const double near = start ? h->touching : h->together * fmax(1.0, most);
+    // An approach that is rounding of what the accelerations make in the run is no impact.
+    const double rounded = h->resolved_approach * symdyn_most(at.free, h->n_rows) * (h->end - h->begin);
     for (int k = 0; k < h->n_contacts; k++) {
         closing[k] = hit[k] = 0;
         if (!h->normal[k]) {
@@ -295,7 +297,7 @@ static int symdyn_make_switch(symdyn_hybrid *h) {
         const double v = at.slip[h->first[k]];
         const int touches = fabs(at.of_contact[4 * k]) <= near && v <= (start ? h->touching : 0.0);
         closing[k] = symdyn_has_fired(h, k, SYMDYN_CLOSES) || (h->mode[k] == SYMDYN_OPEN && !h->passed[k] && touches);
-        hit[k] = closing[k] && v < (start ? -h->touching : 0.0);
+        hit[k] = closing[k] && v < -(start ? h->touching : rounded);
         any_hit |= hit[k];
         if (h->mode[k] == SYMDYN_OPEN && !closing[k]) continue;
         if (n >= SYMDYN_MOST_SITES) return SYMDYN_LEFT;

@@ -37,7 +37,7 @@ typedef struct {
     const double *atol;
     long most_steps;  // attempted, of one phase, and of one call
     double touching, together, missed, no_speed, noise, dependent, different, energy;
-    double shortest_flight, resolved_flight, lowest_flight, far;
+    double shortest_flight, resolved_flight, lowest_flight, resolved_approach, far;
 
     // Beginnings of slips, see symdyn/runtime/integrating/slip_begins.py.
     double tolerated, rounded, shortest, resolved, guess, longest, grows, larger;
