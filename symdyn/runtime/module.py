@@ -247,7 +247,19 @@ class Module:
 
     def following(self, inputs: Inputs | np.ndarray) -> Module:
         """The module whose motions are those of a run, or those of inputs (n_in,), wherever inputs are left out: constraints
-        depend on motions, too, though on no other inputs."""
+        depend on motions, too, though on no other inputs.
+
+        >>> z, q = sd.motions("z"), sd.coordinates("q")
+        >>> lift = sd.System("lift", gravity=[0, -9.81])
+        >>> floor, ball = lift.add_body("floor", mass=1), lift.add_body("ball", mass=1)
+        >>> _ = lift.add_joint(sd.Prismatic("lifted", lift.ground, floor, axis=[0, 1], coordinate=z))
+        >>> _ = lift.add_joint(sd.Prismatic("up", floor, ball, axis=[0, 1], coordinate=q))
+        >>> module = lift.compile(backend="numpy")
+        >>> module.metadata.inputs
+        ('z', 'z_dot', 'z_ddot')
+        >>> module.following(np.array([0.0, 0.0, 2.0])).rhs(0, [0.0, 0.0])  # upwards at 2 m/s^2
+        array([  0.  , -11.81])
+        """
         if not self.metadata.motions:
             return self
         other = copy.copy(self)
@@ -255,7 +267,11 @@ class Module:
         return other
 
     def motions_at(self, t: float) -> np.ndarray | None:
-        """Inputs (n_in,) with the motions of a run; None where the module follows none."""
+        """Inputs (n_in,) with the motions of a run; None where the module follows none.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").motions_at(0.0) is None
+        True
+        """
         return None if self._left_out is None else self._left_out(t)
 
     def mass_matrix(self, *at: States | None, x: States | None = None, q: States | None = None, params: States | None = None,
@@ -1253,7 +1269,12 @@ class Module:
         return tuple(self._library(name).metadata.shapes[name])
 
     def library(self, what: str | RightSide) -> Library:
-        """The loaded library that has a function, or a right-hand side with its integrator."""
+        """The loaded library that has a function, or a right-hand side with its integrator.
+
+        >>> library = sd.systems.pendulum().compile(backend="numpy").library("energy")
+        >>> library.backend, library.metadata.operations
+        ('numpy', {'energy': 6})
+        """
         return self._library(what)
 
     def _has(self, what: str | RightSide) -> bool:

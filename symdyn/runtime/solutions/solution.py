@@ -433,7 +433,13 @@ class Solution:
         return self._work is not None
 
     def input_slopes(self, columns: np.ndarray) -> np.ndarray:
-        """Derivatives of inputs that controllers hold, or that follow the state, along columns (n_t, k, n_x), (n_t, n_in, k)."""
+        """Derivatives of inputs that controllers hold, or that follow the state, along columns (n_t, k, n_x), (n_t, n_in, k).
+
+        >>> push = sd.Smooth(lambda t, x: -3 * x[0], gradient=lambda t, x: [-3, 0, 0, 0])
+        >>> solution = sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": push})
+        >>> solution.input_slopes(np.broadcast_to(np.eye(4), (len(solution.t), 4, 4)))[0]
+        array([[-3.,  0.,  0.,  0.]])
+        """
         given, shape = self._inputs, (len(self.t), self.module.metadata.sizes.inputs, columns.shape[1])
         rows = [given.slopes(t, x, row) for t, x, row in zip(self.t.tolist(), self.x, columns, strict=True)]
         return np.array(rows).reshape(shape) + (0.0 if given.record is None else given.record.slopes(self.t))
