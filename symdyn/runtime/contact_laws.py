@@ -145,12 +145,16 @@ def _with_static_friction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], s
 
 
 def _may_be_kept(D: np.ndarray, sites: Sequence[Site], k: int) -> bool:
-    """Whether other rows, if they held, would keep a site from slipping, and whether its static friction can be written as a
-    multiple of the kinetic one, in a given direction."""
+    """Whether other rows that may hold would keep a site from slipping, and whether its static friction can be written as a
+    multiple of the kinetic one, in a given direction. A contact that slips, or must, keeps no other from it."""
     site = sites[k]
     if len(sites) == 1 or len(site.tangents) != 1 or site.kinetic == 0:
         return False
-    return moves_with(D, site.tangents[0], [row for row in range(len(D)) if row != site.tangents[0]])
+    closed = [one for one in sites if not {STICKING, SLIDING} <= set(one.excluded)]
+    held = [one.normal for one in closed if one.normal is not None]
+    held += [row for one in closed if one is not site and one.slip is None and STICKING not in one.excluded
+             for row in one.tangents]
+    return moves_with(D, site.tangents[0], held)
 
 
 def _is_kept(D: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], k: int) -> bool:

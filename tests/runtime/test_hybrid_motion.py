@@ -38,7 +38,7 @@ def in_c(D: np.ndarray, b: np.ndarray, sites: list[Site]) -> tuple[int, list[str
     excluded = np.array([sum(1 << mode_codes.MODES.index(mode) for mode in site.excluded) for site in sites], dtype=np.intc)
     coefficients = np.array([[s.static, s.kinetic, 0.0 if s.slip is None or not len(s.slip) else s.slip[0]] for s in sites])
     mode, answer = np.zeros(n, dtype=np.intc), np.zeros(n + 2 * len(b))
-    tolerances = np.array([laws.NOISE, DEPENDENT, laws.DIFFERENT])
+    tolerances = np.array([laws.NOISE, DEPENDENT, laws.DIFFERENT, laws.KEPT])
     arrays = [rows, excluded, coefficients, np.ascontiguousarray(D), b, tolerances, mode, answer]
     found = hybrid_in_c().symdyn_hybrid_modes(n, *[ctypes.c_void_p(a.ctypes.data) for a in arrays])
     return found, [mode_codes.MODES[k] for k in mode.tolist()], answer[n:n + len(b)], answer[n + len(b):]
@@ -59,9 +59,9 @@ def test_modes_are_those_of_all_combinations(n: int, problems: int) -> None:
             kinetic = float(stream.uniform(0, 2))
             static = kinetic * float(stream.choice([1.0, 1.5]))
             slip = np.array([float(stream.choice([-1.0, 1.0]))])[:len(rows) - 1 + bounded] if stream.uniform() < 0.4 else None
-            ruled = ((), (laws.STICKING,), (laws.STICKING, laws.SLIDING))[stream.choice(3, p=[0.8, 0.1, 0.1])]
+            ruled = ((), (laws.STICKING,), (laws.STICKING, laws.SLIDING))[stream.choice(3, p=[0.7, 0.2, 0.1])]
             sites.append(Site(rows, static, kinetic, slip, excluded=ruled[:1] if bounded else ruled, bounded=bounded))
-        dependent = k % 10 == 0 and first > 1
+        dependent = k % 4 == 0 and first > 1
         root = stream.normal(size=(first, first - 1 if dependent else first + 1))
         D, b = root @ root.T, stream.normal(size=first) * (k % 15 > 0)
         found, modes, lam, w = in_c(D, b, sites)
@@ -238,15 +238,8 @@ class Switches:
         self.motion, self.library = motion, cache.load(text("hybrid") + SWITCH, "symdyn_hybrid", require_compiler())
 
     def draw(self) -> Any:
-        """One of them, of another state with the same contacts closed, sticking and meeting, whose forces have left their bounds
-        where that has fired; of one in four nothing is left of the approach but rounding."""
-        while True:
-            one = self._near()
-            values = one._values("events", one.t, one.x, one._parameters())
-            if all(values[one.events[k][what]] <= 0 for k, what in one.fired if what in ("opens", "slips")):
-                return one
-
-    def _near(self) -> Any:
+        """One of them, of another state with the same contacts closed, sticking and meeting; of one in four nothing is left of
+        the approach but rounding. Forces may be within the bounds that they are to have left."""
         seen, stream = self.seen[self.stream.integers(len(self.seen))], self.stream
         one, middle = copy.copy(seen), seen.module.metadata.sizes.q + seen.module.metadata.sizes.u
         one.impacts, one.happened, one.doubts, one.ruled_out, one.left = [], [], {}, {}, {}

@@ -142,7 +142,7 @@ class Motion:
         self.record = record = Record(
             n_q=sizes.q, n_u=sizes.u, n_state=sizes.x, n_x=n_x, n_p=self.n_p, n_contacts=n, n_rows=n_rows, n_events=n_events,
             most_steps=MOST_STEPS, most_phases=MOST_PHASES, most_happened=4 * MOST_PHASES + 2 * n_events,
-            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=DEPENDENT, different=laws.DIFFERENT, far=FAR,
+            most_impacts=MOST_PHASES, noise=laws.NOISE, dependent=DEPENDENT, different=laws.DIFFERENT, kept=laws.KEPT, far=FAR,
             tolerated=slip_begins.TOLERATED, rounded=slip_begins.ROUNDED, shortest=slip_begins.SHORTEST,
             resolved=slip_begins.RESOLVED, guess=slip_begins.GUESS,
             longest=slip_begins.LONGEST, grows=slip_begins.GROWS, larger=slip_begins.LARGER, guesses=slip_begins.GUESSES)

@@ -19,13 +19,14 @@ typedef struct {
 } symdyn_site;
 
 // A problem with its answer. noise: part of the sizes to which inequalities hold; dependent: pivots below this part of the
-// largest entry; different: accelerations that differ by more than this part are different solutions. The answer: what every
-// site does, the sign of its slip, forces and what comes of them.
+// largest entry; different: accelerations that differ by more than this part are different solutions; kept: a tangent that is
+// left this part of its mobility where other rows hold does not move. The answer: what every site does, the sign of its slip,
+// forces and what comes of them.
 typedef struct {
     int n, n_sites;
     double D[SYMDYN_MOST_ROWS][SYMDYN_MOST_ROWS], b[SYMDYN_MOST_ROWS];
     symdyn_site site[SYMDYN_MOST_SITES];
-    double noise, dependent, different;
+    double noise, dependent, different, kept;
     int mode[SYMDYN_MOST_SITES];
     double sign[SYMDYN_MOST_SITES], lam[SYMDYN_MOST_ROWS], w[SYMDYN_MOST_ROWS];
 } symdyn_modes;
@@ -155,9 +156,37 @@ static int symdyn_only_solution(symdyn_modes *m) {
     return found;
 }
 
+// Whether other rows that may hold would keep a site from slipping, which has no slip but must not stick: its friction may then
+// be static.
+static int symdyn_may_be_kept(const symdyn_modes *m, int of) {
+    const int rubs = symdyn_rubs(m->site + of), never = 1 << SYMDYN_STICKING | 1 << SYMDYN_SLIDING;
+    double A[SYMDYN_MOST_ROWS][SYMDYN_MOST_ROWS], x[SYMDYN_MOST_ROWS], left = m->D[rubs][rubs];
+    int held[SYMDYN_MOST_ROWS], n = 0;
+    for (int s = 0; s < m->n_sites; s++) {
+        const symdyn_site *const site = m->site + s;
+        if ((site->excluded & never) == never) continue;
+        if (!site->bounded) held[n++] = site->first;
+        if (s != of && symdyn_rubs(site) >= 0 && site->slip == 0.0 && !(site->excluded >> SYMDYN_STICKING & 1))
+            held[n++] = symdyn_rubs(site);
+    }
+    if (!n) return 0;
+    for (int i = 0; i < n; i++) {
+        x[i] = m->D[held[i]][rubs];
+        for (int j = 0; j < n; j++) A[i][j] = m->D[held[i]][held[j]];
+    }
+    if (symdyn_solve_rows(n, SYMDYN_MOST_ROWS, A[0], x, m->dependent)) return 1;
+    for (int i = 0; i < n; i++) left -= m->D[held[i]][rubs] * x[i];
+    return !(left > m->kept * m->D[rubs][rubs]);
+}
+
 // The same of any problem: what static friction can hold does not begin to slide; kinetic friction, where it is less, counts for
-// what slides then.
+// what slides then. A site that must not stick, but may be kept from slipping by others, is left to the caller.
 static int symdyn_solve_modes(symdyn_modes *m) {
+    for (int s = 0; s < m->n_sites && m->n_sites > 1; s++) {
+        const symdyn_site *const site = m->site + s;
+        const int begins = symdyn_rubs(site) >= 0 && site->slip == 0.0 && site->friction != 0.0;
+        if (begins && site->excluded >> SYMDYN_STICKING & 1 && symdyn_may_be_kept(m, s)) return -1;
+    }
     for (;;) {
         symdyn_modes held = *m;
         int steep[SYMDYN_MOST_SITES], slides = 0;

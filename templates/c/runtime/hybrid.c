@@ -26,11 +26,12 @@ SYMDYN_EXPORT int symdyn_hybrid_go(symdyn_hybrid *h) {
 
 // The only solution of one problem alone, see contact_modes.h, of n sites with so many rows each (0: one of dry friction of a
 // joint), modes that are ruled out, and friction (static, kinetic) and the sign of the slip of each; tolerances: noise,
-// dependent, different. answer: signs of slips (n), forces, what comes of them. Returns 1, 0 where there is none, -1 where that
-// is not certain.
+// dependent, different, kept. answer: signs of slips (n), forces, what comes of them. Returns 1, 0 where there is none, -1 where
+// that is not certain.
 SYMDYN_EXPORT int symdyn_hybrid_modes(int n, const int *rows, const int *excluded, const double *coefficients, const double *D,
     const double *b, const double *tolerances, int *mode, double *answer) {
-    symdyn_modes m = {.n_sites = n, .noise = tolerances[0], .dependent = tolerances[1], .different = tolerances[2]};
+    symdyn_modes m = {
+        .n_sites = n, .noise = tolerances[0], .dependent = tolerances[1], .different = tolerances[2], .kept = tolerances[3]};
     for (int s = 0; s < n; s++) {
         const double *const of = coefficients + 3 * s;
         m.site[s] = (symdyn_site){.first = m.n,

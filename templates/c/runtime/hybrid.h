@@ -114,6 +114,7 @@ static int symdyn_problem_of(const symdyn_hybrid *h, int n, const int *contact, 
     m->noise = h->noise;
     m->dependent = h->dependent;
     m->different = h->different;
+    m->kept = h->kept;
     for (int s = 0; s < n; s++) {
         const int k = contact[s];
         const int rubs = impact || h->still[k] ? -1 : symdyn_friction_of(h, k);

@@ -36,7 +36,7 @@ typedef struct {
     double begin, end, same, rtol, first_step, max_step, spacing;
     const double *atol;
     long most_steps;  // attempted, of one phase, and of one call
-    double touching, together, missed, no_speed, noise, dependent, different, energy;
+    double touching, together, missed, no_speed, noise, dependent, different, kept, energy;
     double shortest_flight, resolved_flight, lowest_flight, resolved_approach, far;
 
     // Beginnings of slips, see symdyn/runtime/integrating/slip_begins.py.
