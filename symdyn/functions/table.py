@@ -291,10 +291,12 @@ def seldom_called(name: str) -> bool:
 
 def quantity_of(name: str) -> str:
     """The quantity behind a function; any quantity is a function under its own name, too."""
-    return ALL[name].quantity if name in ALL else name
+    entry = entry_of(name)
+    return name if entry is None else entry.quantity
 
 
 def title_of(name: str, constrained: bool) -> str:
-    """Description of a function in the header of generated code."""
-    title = ALL[name].title if name in ALL else name
+    """Description of a function in the header of generated code; of a name without an entry the name itself."""
+    entry = entry_of(name)
+    title = name if entry is None else entry.title
     return title + (OF_THE_CUT_TREE.get(name, "") if constrained else "")

@@ -13,8 +13,9 @@ import sympy as sp
 import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.functions.groups import of_right_side
-from symdyn.functions.table import ALL, FUNCTIONS, INTERMEDIATE, entry_of, quantity_of, title_of
+from symdyn.functions.table import ALL, EVERY, FUNCTIONS, INTERMEDIATE, entry_of, quantity_of, title_of
 from symdyn.functions.tapes import has_function, tape_as_derived
+from symdyn.pipeline import emit
 from tests.mechanisms import kitchen_sink
 
 MECHANISMS = {"cart_pole": "embedding", "four_bar": "augmented", "three_link_arm": "recursive", "flyball_governor": "embedding",
@@ -74,12 +75,24 @@ def test_functions_are_there_where_a_mechanism_has_what_they_need() -> None:
 
 
 def test_titles_are_plain_text_for_headers() -> None:
-    for name, entry in ALL.items():
+    for name, entry in EVERY.items():
         assert re.fullmatch(r"[ -~]+", entry.title), name  # ASCII: it goes into C files
         assert quantity_of(name) == entry.quantity
     of_tree = title_of("inverse_dynamics", True).removeprefix(FUNCTIONS["inverse_dynamics"].title)
     assert of_tree == ", of the tree: loops cut, without constraints"
-    assert title_of("M_tilde", False) == "M_tilde" == quantity_of("M_tilde")
+    assert title_of("M_tilde", False) == FUNCTIONS["mass_matrix"].title and quantity_of("M_tilde") == "M_tilde"
+
+
+@pytest.mark.parametrize(("name", "title"), [
+    ("energy_by_x", "derivatives of energy by x"), ("v_2", "v of link 2"), ("outputs_hessian_x",
+     "second derivatives of a weighted sum of outputs by x"), ("bias", INTERMEDIATE["bias"].title), ("unheard_of", "unheard_of")])
+def test_titles_are_those_of_the_entries_of_families_and_quantities_too(name: str, title: str) -> None:
+    assert title_of(name, False) == title
+
+
+def test_headers_of_generated_code_have_titles_of_families() -> None:
+    text = emit(sd.systems.pendulum().equations(), "c", ["energy_by_x"]).files["pendulum.c"]
+    assert "// derivatives of energy by x\n" in text
 
 
 def on_matrices() -> Any:
