@@ -8,14 +8,13 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-import symdyn
+from tests.package_trees import PACKAGE, package_trees
 from tests.test_words import STYLE, unwanted
 
 # GPUs run kernels; the tape has intrinsic functions.
 KERNELS = {"kernel", "kernels"}
 FOR_GPUS = re.compile(r"gpu|_device\.py$|c/runtime/kernel\.h$")
 ROOT = Path(__file__).parents[1]
-PACKAGE = Path(symdyn.__file__).parent
 PAGE = ROOT / "docs" / "architecture.md"
 
 
@@ -48,19 +47,33 @@ class File(NamedTuple):
 
 @functools.cache
 def files() -> list[File]:
-    paths = [(path, path.relative_to(PACKAGE)) for path in sorted(PACKAGE.rglob("*.py"))]
-    trees = [(inside, ast.parse(path.read_text(encoding="utf-8"))) for path, inside in paths
-             if inside.parts[0] not in ("__init__.py", "__main__.py")]
-    kinds = ast.Import, ast.ImportFrom, ast.Attribute, ast.If
-    return [File(inside.as_posix(), inside.parts[0].removesuffix(".py"), tree.body,
-                 [node for node in ast.walk(tree) if isinstance(node, kinds)], words_of(tree)) for inside, tree in trees]
+    return [File(path, path.split("/")[0].removesuffix(".py"), tree.body, *looked_through(tree))
+            for path, tree in package_trees().items() if path not in ("__init__.py", "__main__.py")]
 
 
-def words_of(tree: ast.Module) -> set[str]:
-    """Words of the names that a file gives to variables, arguments, functions and classes."""
-    names = {node.id if isinstance(node, ast.Name) else node.arg if isinstance(node, ast.arg) else node.name
-             for node in ast.walk(tree) if isinstance(node, ast.Name | ast.arg | ast.FunctionDef | ast.ClassDef)}
-    return {word for name in names for word in name.lower().split("_")}
+# What holds the name of a kind of node.
+NAMED = {ast.Name: "id", ast.arg: "arg", ast.FunctionDef: "name", ast.ClassDef: "name"}
+
+
+def looked_through(tree: ast.Module) -> tuple[list[ast.AST], set[str]]:
+    """Imports, attributes and `if` of a file, and the words of the names that it gives to variables, arguments, functions and
+    classes. All nodes of the package are more than a million: each is seen once, and where it has no others inside, not asked."""
+    nodes: list[ast.AST] = []
+    names: set[str] = set()
+    rest: list[ast.AST] = [tree]
+    while rest:
+        node = rest.pop()
+        kind = type(node)
+        if kind in NAMED:
+            names.add(getattr(node, NAMED[kind]))
+            if kind is ast.Name:
+                continue
+        elif kind in (ast.Import, ast.ImportFrom, ast.Attribute, ast.If):
+            nodes.append(node)
+        elif kind is ast.Constant:
+            continue
+        rest += ast.iter_child_nodes(node)
+    return nodes, {word for name in names for word in name.lower().split("_")}
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -150,7 +163,7 @@ def wrong_words(path: str, words: set[str]) -> set[str]:
 
 def test_names_have_the_words_of_the_field() -> None:
     assert {file.path: wrong for file in files() if (wrong := wrong_words(file.path, file.words))} == {}
-    assert words_of(ast.parse("def told(beside):\n    is_locking = beside")) == {"told", "beside", "is", "locking"}
+    assert looked_through(ast.parse("def told(beside):\n    is_locking = beside")) == ([], {"told", "beside", "is", "locking"})
     assert wrong_words("tape/intrinsics.py", {"kernel", "painter", "of"}) == {"kernel", "painter"}
     assert wrong_words("runtime/gpu/device.py", {"kernel", "painter", "of"}) == {"painter"}
 

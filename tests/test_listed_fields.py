@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1] / "symdyn"
+from tests.package_trees import definitions, package_trees
+
 # Two spaces at least stand between the names of a row and their meaning.
 ROW = re.compile(r"(\w+(?:, \w+)*) {2,}\S")
 
@@ -38,26 +38,23 @@ def stale(trees: Mapping[str, ast.Module]) -> list[str]:
     """Names in lists of docstrings that the class or function lacks. A list with none of its names is about something else."""
     classes: dict[str, list[ast.ClassDef]] = {}
     for tree in trees.values():
-        for node in ast.walk(tree):
+        for node in definitions(tree):
             if isinstance(node, ast.ClassDef):
                 classes.setdefault(node.name, []).append(node)
     result = []
     for path, tree in trees.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef | ast.FunctionDef):
-                text = (ast.get_docstring(node) or "").partition(">>>")[0]
-                listed = [name for line in text.splitlines() if (row := ROW.match(line)) for name in row[1].split(", ")]
-                if listed:
-                    existing = fields(node, classes) if isinstance(node, ast.ClassDef) else arguments(node)
-                    missing = [name for name in listed if name not in existing]
-                    result += [f"{path}: {node.name} has no {name}" for name in missing if len(missing) < len(listed)]
+        for node in definitions(tree):
+            text = (ast.get_docstring(node) or "").partition(">>>")[0]
+            listed = [name for line in text.splitlines() if (row := ROW.match(line)) for name in row[1].split(", ")]
+            if listed:
+                existing = fields(node, classes) if isinstance(node, ast.ClassDef) else arguments(node)
+                missing = [name for name in listed if name not in existing]
+                result += [f"{path}: {node.name} has no {name}" for name in missing if len(missing) < len(listed)]
     return result
 
 
 def test_listed_fields_exist() -> None:
-    trees = {path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
-             for path in sorted(PACKAGE.rglob("*.py"))}
-    assert stale(trees) == []
+    assert stale(package_trees()) == []
 
 
 def test_a_stale_field_is_found() -> None:
