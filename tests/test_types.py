@@ -88,12 +88,14 @@ def test_the_stub_has_the_public_names_and_where_they_are() -> None:
     assert public | {"t"} == set(sd.__all__)
 
 
-def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path) -> None:
+def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    """With what mypy keeps from one run to the next, it reads only files that have changed."""
     file = tmp_path / "user.py"
     file.write_text(USER + "".join(f"reveal_type({expression})\n" for expression in REVEALED), encoding="utf-8")
     settings = tmp_path / "mypy.ini"
     settings.write_text(SETTINGS, encoding="utf-8")
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(settings), "--cache-dir", os.devnull, str(file)]
+    cache = pytestconfig.cache.mkdir("mypy") if pytestconfig.cache else os.devnull
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(settings), "--cache-dir", str(cache), str(file)]
     found = subprocess.run(command, capture_output=True, text=True, cwd=STUB.parent.parent, check=False)
     assert found.returncode == 0, found.stdout
     revealed = [re.search(r"(\w+)(?:\[.*)?\"$", line)[1] for line in found.stdout.splitlines() if "Revealed type" in line]
@@ -106,12 +108,13 @@ def test_the_stub_of_the_catalogue_has_its_mechanisms() -> None:
     assert {name: home.replace(" import ", ":") for home, name in listed.items()} == systems._CATALOGUE
 
 
-@pytest.fixture
-def jedi(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Jedi with a cache of its own: processes that share one read files that another has half written."""
+@pytest.fixture(scope="module")
+def jedi(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    """Jedi with a cache of this process: processes that share one read files that another has half written."""
     package: ModuleType = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
-    monkeypatch.setattr(package.settings, "cache_directory", str(tmp_path))
-    return package
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(package.settings, "cache_directory", str(tmp_path_factory.mktemp("jedi")))
+        yield package
 
 
 @pytest.mark.parametrize(("after", "names"), [
