@@ -11,6 +11,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import EvaluationError, ModelError, SimulationWarning
+from tests.helpers import swept
 
 x, y, s, theta = sd.coordinates("x y s theta")
 m, l, g, mu, omega, r = sd.parameters("m l g mu omega r")
@@ -31,6 +32,7 @@ def bead(gravity=(0, 0, 0)):
     return system
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ("numpy", "c"))
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_bead_with_friction_moves_as_the_sum_of_two_exponentials(formulation, backend):
@@ -136,6 +138,7 @@ def test_a_rod_at_the_very_border_jams(angle):
         rod(backend="numpy").outputs(0, [0, angle, 1.0, 0.0], {"mu": friction})
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ("numpy", "c"))
 @pytest.mark.parametrize("friction", (1.34, 1.5, 2.0))
 def test_a_run_stops_where_the_rod_jams(friction, backend):
@@ -189,8 +192,9 @@ def ladder_by_hand(angle, spin, friction):
 
 
 @pytest.mark.every_value
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ("numpy", "c"))
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", swept(range(8), 0, 1, 2))
 def test_two_frictions_at_once(seed, backend):
     stream = np.random.default_rng(seed)
     angle, spin, friction = stream.uniform(-1.4, -0.2), stream.uniform(-3, 3), stream.uniform(0.05, 0.4)
