@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import SymdynError
+from tests.running import run_program
 
 FORMS = [("two_link_arm", "embedding"), ("spatial_chain", "recursive"), ("four_bar", "augmented"),
          ("pendulum_absolute", "augmented")]
@@ -65,11 +64,11 @@ def test_another_process_computes_the_same_bits(tmp_path: Path) -> None:
     module = sd.systems.get("double_pendulum").compile()
     x = np.array([0.3, -1.2, 0.5, 2.0])
     (tmp_path / "module.pickle").write_bytes(pickle.dumps(module))
-    program = ("import pickle, sys; m = pickle.load(open(sys.argv[1], 'rb')); "
-               "print(m.rhs(0.0, [0.3, -1.2, 0.5, 2.0]).tobytes().hex(), m.rhs(0.0, [0.0] * 4).shape)")
-    found = subprocess.run([sys.executable, "-c", program, str(tmp_path / "module.pickle")], capture_output=True, text=True,
-                           check=True, timeout=120).stdout.split()
-    assert found[0] == module.rhs(0.0, x).tobytes().hex()
+    (tmp_path / "there.py").write_text("import pickle; m = pickle.load(open('module.pickle', 'rb'))\n"
+                                       "print(m.rhs(0.0, [0.3, -1.2, 0.5, 2.0]).tobytes().hex(), m.rhs(0.0, [0.0] * 4).shape)")
+    run = run_program(tmp_path / "there.py")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split()[0] == module.rhs(0.0, x).tobytes().hex()
 
 
 def test_a_copy_without_equations_says_what_to_do() -> None:
