@@ -111,17 +111,23 @@ def _derivatives_agree(program: Program, z: np.ndarray) -> None:
     assert np.abs(whole @ direction - found).max() < 1e-8 * (1 + np.abs(found).max())
 
 
+@functools.cache
+def module_of(loops: bool) -> Any:
+    """A cart with a pole, or a linkage with a torque at its crank."""
+    if not loops:
+        return sd.systems.cart_pole().compile(backend="c")
+    system = sd.systems.four_bar()
+    system.add_joint_force("hinge1", sd.inputs("tau"))
+    return system.compile(backend="c")
+
+
 @pytest.mark.every_value
 @pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(radau, degree=3), functools.partial(shooting, hold=False),
                                   functools.partial(shooting, hold=True)], ids=["hermite-simpson", "radau", "shooting", "held"])
 @pytest.mark.parametrize("loops", [False, True])
 def test_programs_against_differences(mesh: Any, loops: bool) -> None:
-    if loops:
-        system, parameter, force = sd.systems.four_bar(), "l2", "tau"
-        system.add_joint_force("hinge1", sd.inputs("tau"))
-    else:
-        system, parameter, force = sd.systems.cart_pole(), "l", "F"
-    module = system.compile(backend="c")
+    module = module_of(loops)
+    parameter, force = ("l2", "tau") if loops else ("l", "F")
     a, b, u = sp.Symbol(module.metadata.x[0]), sp.Symbol(module.metadata.x[1]), sp.Symbol(force)
     problem = problem_of(module, sd.Loss(integral=u**2 + a**2 * sd.t, end=sd.t * b**2), (1.0, 3.0), "free", None, None,
                          {force: (-50, 60)}, [u * a <= 3 + sp.Symbol(parameter)], [sp.Eq(sp.Symbol(f"{a}(0)"), sp.sin(b))],
@@ -133,11 +139,12 @@ def test_programs_against_differences(mesh: Any, loops: bool) -> None:
     on = Discretized(problem, made, 2, Motion(X, rng.normal(size=(len(made.samples), 1)), problem.p, 1.7))
     z = on.z + 0.05 * rng.normal(size=len(on.z))
     _derivatives_agree(on.program, z)
-    _derivatives_agree(Discretized(problem, made, 2, on.guess, elastic=True).program, np.append(
-        z, np.ones(Discretized(problem, made, 2, on.guess, elastic=True).program.n - len(z))))
+    elastic = Discretized(problem, made, 2, on.guess, elastic=True).program
+    _derivatives_agree(elastic, np.append(z, np.ones(elastic.n - len(z))))
 
 
-def timed_point() -> sd.System:
+@functools.cache
+def timed_point() -> Any:
     """A point on a parabola that moves, pushed by a force and by one that depends on the time."""
     x, y, phi = sd.coordinates("x y phi")
     F, a = sd.inputs("F"), sd.parameters("a")
@@ -148,14 +155,14 @@ def timed_point() -> sd.System:
     system.add_constraint(y - x**2 - a * sp.sin(2 * sd.t), name="parabola")
     system.add_output("late", x * sp.cos(sd.t) + a * sd.t)
     system.defaults, system.initial = {a: 0.3}, {x: 0.2, y: 0.04}
-    return system
+    return system.compile(backend="c")
 
 
 @pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(radau, degree=3), functools.partial(shooting, hold=False)],
                          ids=["hermite-simpson", "radau", "shooting"])
 def test_programs_of_equations_that_depend_on_the_time(mesh: Any) -> None:
     """With a free duration, by which rates, outputs and constraints are differentiated, too."""
-    module = timed_point().compile(backend="c")
+    module = timed_point()
     late, x, F = sp.symbols("late x F")
     problem = problem_of(module, sd.Loss(integral=F**2 * late, end=late**2), (1.0, 3.0), "free", None, None, None,
                          [late * F <= 3], [sp.Eq(sp.Symbol("x(0)") * late, x)], {"a": (0.1, 1)}, None, None, 0.3)

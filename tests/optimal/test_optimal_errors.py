@@ -265,7 +265,7 @@ def test_costs_with_kinks() -> None:
     with pytest.raises(sd.NoOptimum, match=text):
         sd.optimize(system.compile(backend="c"), sd.Loss(integral=sp.Abs(F)), 2.0, bounds={"F": (-3, 3)}, **given)
     found = sd.optimize(split.compile(backend="c"), sd.Loss(integral=plus + minus), 2.0, bounds={plus: (0, 3), minus: (0, 3)},
-                        transcription="shooting", hold=True, intervals=200, **given)
+                        transcription="shooting", hold=True, intervals=80, **given)
     assert found.cost == pytest.approx(6 * (1 - np.sqrt(1 - 0.5 / 3)), rel=2e-3)
     with pytest.raises(sd.NoOptimum) as error:
         sd.optimize(system.compile(backend="c"), EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)})

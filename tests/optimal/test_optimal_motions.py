@@ -51,6 +51,12 @@ def linkage() -> Module:
 
 
 @functools.cache
+def walking() -> tuple[Module, sd.Optimum]:
+    module = gait.biped().compile(backend="c")
+    return module, gait.step(module, intervals=15, tolerance=1e-5)
+
+
+@functools.cache
 def swing_up(**options: Any) -> sd.Optimum:
     return sd.optimize(cart_pole(), EFFORT, 2.0, **KELLY, **options)
 
@@ -93,7 +99,7 @@ def test_minimum_time_by_a_bounded_force() -> None:
         assert np.allclose(np.abs(found["F"][1:-1][[2, -3]]), 1, atol=1e-5) and found.t[-1] == pytest.approx(found.duration)
 
 
-@pytest.mark.parametrize("transcription", ["hermite-simpson", "radau", "shooting"])
+@pytest.mark.parametrize("transcription", ["hermite-simpson", *swept(["radau"]), "shooting"])
 def test_minimum_time_with_a_bounded_rate_of_the_force(transcription: str) -> None:
     """The force falls at its full rate r: F = r (T/2 - t), x(T) = r T^3/(12 m) = d."""
     found = sd.optimize(slider(), sd.Loss(end=sd.t), (0.1, 10), end={"x": 1, "x_dot": 0}, rates={"F": (-8, 8)}, intervals=12,
@@ -141,7 +147,7 @@ def sprung() -> Module:
 
 
 @pytest.mark.parametrize(("options", "near"), [
-    ({"tolerance": 1e-7}, 1e-6), ({"transcription": "radau"}, 1e-6), ({"transcription": "shooting"}, 2e-4),
+    ({"tolerance": 1e-7}, 1e-6), *swept([({"transcription": "radau"}, 1e-6), ({"transcription": "shooting"}, 2e-4)]),
     ({"method": "slsqp", "intervals": 8, "tolerance": None}, 1e-3)])
 def test_small_and_large_motions(options: dict[str, Any], near: float) -> None:
     """A mass on a spring comes to rest at a: the effort is a^2 b^T W^-1 b with W the Gramian, in all units of length, mass and
@@ -152,7 +158,7 @@ def test_small_and_large_motions(options: dict[str, Any], near: float) -> None:
         W = flow[2:, 2:].T @ flow[:2, 2:]
         return float(np.linalg.inv(W)[0, 0] * a**2 * m**2 / T**3)
 
-    for a, m, T in ((1, 1, 1), (1e-3, 1, 1), (1e-6, 1, 1), (1e-9, 1, 1), (1e3, 1, 1), (1e-9, 1e-9, 1e-2), (1e6, 1e5, 1e4)):
+    for a, m, T in ((1, 1, 1), (1e-9, 1, 1), (1e-9, 1e-9, 1e-2), (1e6, 1e5, 1e4)):
         k = 20 * m / T**2
         with warnings.catch_warnings():
             warnings.simplefilter("error", sd.OptimumWarning)
@@ -425,17 +431,22 @@ def test_lengths_of_a_linkage_as_free_parameters() -> None:
 
 
 def test_gait_of_a_biped() -> None:
-    """Kelly (2017), section 6: both transcriptions agree, the step repeats itself, the impact loses energy."""
-    module = gait.biped().compile(backend="c")
-    first = gait.step(module, intervals=15, tolerance=1e-5)
-    second = gait.step(module, intervals=10, transcription="radau", tolerance=1e-5)
-    assert first.cost == pytest.approx(second.cost, rel=2e-5) and max(first.iterations, second.iterations) < 60
+    """Kelly (2017), section 6: the step repeats itself, the impact loses energy."""
+    module, first = walking()
+    assert first.iterations < 60
     assert np.abs(first.x[0, :5] - first.x[-1, 4::-1]).max() < 1e-7
     before, after = (module.evaluate("energy", 0.0, x, first.params)[0] for x in (first.x[-1], first.x[0]))
     assert 0.2 * before < after < before
     published = gait.step(module, intervals=10, transcription="radau", degree=4, tolerance=None, inputs={"u1": 0},
                           **gait.PUBLISHED)
     assert published.cost == pytest.approx(gait.PUBLISHED_COST, rel=2e-3) and published.iterations < 143
+
+
+@pytest.mark.sweep
+def test_both_transcriptions_find_the_gait_of_a_biped() -> None:
+    module, first = walking()
+    second = gait.step(module, intervals=10, transcription="radau", tolerance=1e-5)
+    assert first.cost == pytest.approx(second.cost, rel=2e-5) and second.iterations < 60
 
 
 def test_impact_of_the_biped_against_constraints_that_begin_to_hold() -> None:
@@ -446,8 +457,10 @@ def test_impact_of_the_biped_against_constraints_that_begin_to_hold() -> None:
     after = sp.symbols("a1:6")
     impact = [c.subs({sp.Symbol(f"q{k + 1}_dot(0)"): a for k, a in enumerate(after)}).subs(symbols)
               for c in gait.boundary()[5:10]]
-    solved = sp.solve([c.lhs - c.rhs for c in impact], after)
-    found = np.array([float(solved[a]) for a in after])  # of the new stance tibia first
+    left = sp.lambdify([after], [c.lhs - c.rhs for c in impact])  # linear in what comes after
+    alone = np.array(left(np.zeros(5)), dtype=float)
+    columns = np.array([left(e) for e in np.eye(5)], dtype=float).T - alone[:, None]
+    found = np.linalg.solve(columns, -alone)  # of the new stance tibia first
     # By the least change of the velocities of all masses under the condition that the new foot stands (Gauss).
     G = sp.Matrix.vstack(*gait.points(sp.symbols("q1:6"))[1])
     names = sp.symbols("q1:6")
@@ -471,7 +484,7 @@ def satellite() -> Module:
     return system.compile(backend="c")
 
 
-@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, {"transcription": "shooting", "intervals": 30}])
+@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, *swept([{"transcription": "shooting", "intervals": 30}])])
 def test_turn_of_a_body_in_euler_parameters(options: dict[str, Any]) -> None:
     """By 2 rad about a principal axis, from rest to rest: 12 I^2 theta^2/T^3; all four parameters are given at both ends."""
     module = satellite()
