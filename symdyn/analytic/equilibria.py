@@ -570,11 +570,11 @@ class _Search:
                 rows, below = max(minors.items(), key=lambda item: abs(_digits(item[1])))
                 if _small(below):
                     return None
-                forces = matrix.extract(list(rows), list(range(matrix.cols))).subs(point).adjugate() \
-                    * right.extract(list(rows), [0]).subs(point) / below
+                forces = matrix.extract(list(rows), list(range(matrix.cols))).xreplace(point).adjugate() \
+                    * right.extract(list(rows), [0]).xreplace(point) / below
                 values |= dict(zip(multipliers, forces, strict=True))
             angles = {k: sp.atan2(*[point[x] for x in self.pairs[k]]) for k in (first, second)}
-            cases.append(replace(case.put(values, angles), left=()))
+            cases.append(replace(case, left=()).put(values, angles))  # none is left: nothing is put into it
         return cases
 
     def _angle(self, unknown: Any) -> sp.Expr:
@@ -658,9 +658,9 @@ def _small(e: sp.Expr) -> bool:
     return bool(abs(_digits(e)) < ZERO)
 
 
-def _minor(matrix: sp.Matrix, rows: Sequence[int], values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+def _minor(matrix: sp.Matrix, rows: Sequence[int], values: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
     """The determinant of some rows."""
-    return matrix.extract(list(rows), list(range(matrix.cols))).det(method="berkowitz").subs(values)
+    return matrix.extract(list(rows), list(range(matrix.cols))).det(method="berkowitz").xreplace(values)
 
 
 def _cosines(one: sp.Expr, other: sp.Expr, s: sp.Symbol, c: sp.Symbol, sine: sp.Symbol, cosine: sp.Symbol,

@@ -292,7 +292,7 @@ def test_four_bars_have_all_equilibria_of_the_numeric_search():
     """With numbers the cosine of an angle is a root of a polynomial of degree six, by resultants."""
     eq = sd.systems.get("four_bar").augmented()
     found = eq.equilibria(values=eq.symbols.defaults, seconds=120)
-    numeric = eq.compile(backend="numpy").equilibria(starts=30)
+    numeric = eq.compile().equilibria(starts=12)
     coordinates = eq.symbols.coordinates
 
     def turns(angles):
