@@ -16,6 +16,7 @@ from symdyn.functions.tapes import columns_of
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.building.library import CLibrary
 from tests.backend.c_warnings import faults_of
+from tests.helpers import swept
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -45,6 +46,7 @@ CASES = [("puma560", {"torques": True}, "embedding", ("m2", "tau3", "", "I3_yy",
          ("floating_wind_turbine", {}, "embedding", ("", "g"))]
 
 
+@pytest.mark.every_value
 @pytest.mark.every_value
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize(("name", "options", "formulation", "by"), CASES)
@@ -90,7 +92,7 @@ def test_where_the_loop_is_chosen() -> None:
     assert columns_of(sd.systems.get("pendulum").embedding(), "rhs", RightSide(sensitivities=("m",) * 5)) is None
 
 
-@pytest.mark.parametrize("method", ["dop853", "bs54", "gauss", "radau", "radau5"])
+@pytest.mark.parametrize("method", ["dop853", *swept(["bs54"]), "gauss", *swept(["radau"]), "radau5"])
 def test_motions(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     by = ["m2", "l1", "q1(0)", "g", "q2_dot(0)"]
     found = []

@@ -136,6 +136,7 @@ def test_mass_that_slides_until_it_sticks(mass: Any) -> None:
         assert abs(found[name] - expected) < 1e-11
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("speed", "slides"), [(2.0, True), (0.3, False)])
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 def test_oblique_impact_with_friction(law: str, speed: float, slides: bool) -> None:
@@ -219,6 +220,7 @@ SLOPES = [(1.0, -1.0, 1.5), (2.0, -2.0, 1.0), (2.0, 1.0, 1.0), (0.2, -1.0, 1.0)]
 
 
 @pytest.mark.every_value
+@pytest.mark.every_value
 @pytest.mark.parametrize("rtol", [1e-8, 1e-11])
 @pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)
 def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float, vx: float, vy: float, rtol: float) -> None:
@@ -236,6 +238,7 @@ def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float
             assert np.abs(run.sensitivity[one][-1, 2:]).max() < 1e-12
 
 
+@pytest.mark.every_value
 @pytest.mark.every_value
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 @pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)

@@ -14,6 +14,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.integrating import gradient as backwards
 from symdyn.runtime.integrating import way_back
+from tests.helpers import swept
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -29,7 +30,7 @@ def module() -> Any:
 
 
 @pytest.mark.native  # its bound is that of fused operations
-@pytest.mark.parametrize("method", ["dop853", "bs54"])
+@pytest.mark.parametrize("method", ["dop853", *swept(["bs54"])])
 def test_exact_for_the_steps_that_were_taken(method: str) -> None:
     """At steps of one length, long ones, the loss is a smooth function, whose differences the gradient is."""
     steps = {"t": (0, 2.0), "rtol": 0.1, "atol": 1e9, "first_step": 0.125, "max_step": 0.125, "method": method}
@@ -64,7 +65,7 @@ def test_like_sensitivities_forwards() -> None:
     assert repr(found).startswith("<Gradient of a loss of") and repr(found).endswith(f"by 5 numbers, {found.n_steps} steps>")
 
 
-@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank"])
+@pytest.mark.parametrize("name", ["four_bar", *swept(["spatial_slider_crank"])])
 def test_on_constraints_like_sensitivities_forwards(name: str) -> None:
     """The projection after every step, and of the start, is carried back, too."""
     mechanism = sd.systems.get(name).augmented().compile()

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler h
 BALL = {"g": 9.81, "e": 0.8, "y(0)": 1.0}
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-11])
 def test_bouncing_ball(method: str, rtol: float) -> None:

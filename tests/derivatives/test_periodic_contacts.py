@@ -54,6 +54,20 @@ def to_zero(at: list[float], values: list[float]) -> float:
     return y[0]
 
 
+def test_a_step_with_light_feet_comes_back() -> None:
+    """Near the published one of feet without mass; along the slope steps may begin anywhere."""
+    m = 1e-3
+    middle = walker().simulate((0, 1.0), *after_heel_strike(0.19393737, -0.20386693), {"m": m}, rtol=1e-10).x[-1]
+    gait = walker().periodic(3.1, middle[:4], middle[4:], {"m": m}, cyclic=["x"], exchange=[("left", "right")], rtol=1e-10)
+    later = walker().simulate((0, gait.period), gait.x[:4], gait.x[4:], {"m": m}, rtol=1e-10).x[-1]
+    back = later[[0, 1, 3, 2, 4, 5, 7, 6]] - gait.x
+    assert np.abs(back[1:]).max() < 1e-7 and back[0] > 0.3
+    sizes = np.sort(np.abs(gait.multipliers))
+    assert len(sizes) == 4 and sizes[0] < 1e-9 and sizes[2] == pytest.approx(1, abs=1e-7) and not gait.stable
+    assert gait.period == pytest.approx(3.0961058680777, abs=4 * m) and sizes[3] == pytest.approx(4.00386436, abs=40 * m)
+
+
+@pytest.mark.sweep
 def test_short_gait_of_the_simplest_walker() -> None:
     """Published digits are those of feet without mass: gaits with feet of 0.00025 to 0.004 of the hip's mass, taken to none."""
     masses, found = [4e-3 / 2**k for k in range(5)], []

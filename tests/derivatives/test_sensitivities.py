@@ -348,6 +348,7 @@ def test_what_has_no_effect() -> None:
     assert not run.sensitivity["m"].any() and run.sensitivity["l"].any()
 
 
+@cache
 def common() -> Any:
     """A double pendulum with a common factor of all masses, which cancels, and a force that acts for a while in between."""
     a, b = sd.coordinates("a b")
@@ -412,6 +413,7 @@ def test_steps_next_to_a_singular_configuration_are_warned_of() -> None:
     assert len(off[True]) > 1 and max(off[True]) > 1e-8
 
 
+@cache
 def three_cranks() -> Any:
     """A parallelogram with three cranks, which moves as long as they are equally long."""
     a, b, c, e = sd.coordinates("a b c e")
