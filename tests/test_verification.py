@@ -10,6 +10,7 @@ from symdyn import verification
 from symdyn.lab import wrong_equations
 from symdyn.verification import checks_of, identities, judged
 from symdyn.verification.states import samples
+from tests.helpers import swept
 
 PRINTED = {
     "M_tilde": ["kinetic energy is quadratic"],
@@ -35,12 +36,16 @@ def test_sound_equations_pass(equations):
     assert "M_tilde is symmetric" in str(result) and "FAIL" not in str(result)
 
 
-@pytest.mark.parametrize("row", range(18))
-def test_every_row_of_the_jacobian_is_proved(row):
-    equations = sd.systems.get("three_link_arm").embedding()
-    wrong = equations.quantity("J") * 1
+@pytest.fixture(scope="module")
+def arm():
+    return sd.systems.get("three_link_arm").embedding()
+
+
+@pytest.mark.parametrize("row", swept(range(18), 0, 10, 17))
+def test_every_row_of_the_jacobian_is_proved(arm, row):
+    wrong = arm.quantity("J") * 1
     wrong[row] = wrong[row] + 1e-9
-    spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, "J": wrong}, _printed={})
+    spoilt = dataclasses.replace(arm, _recorded={**arm._recorded, "J": wrong}, _printed={})
     failed = [check.name for check in spoilt.verify(states=1).checks if check.passed is False]
     assert failed == ["J u is the rate of the positions and rotations"]
 
@@ -156,7 +161,7 @@ def failed_of(equations, states=1):
 CLOSING = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "helical", "rod")
 
 
-@pytest.mark.parametrize("kind", CLOSING)
+@pytest.mark.parametrize("kind", swept(CLOSING, "fixed", "planar", "helical", "rod"))
 def test_every_joint_that_closes_a_loop(kind):
     found = proved(closed(kind).augmented())
     assert False not in found.values(), found
@@ -164,7 +169,8 @@ def test_every_joint_that_closes_a_loop(kind):
             "reactions do no work along what their joints allow", "C_dot is the rate of C"} <= {n for n in found if found[n]}
 
 
-@pytest.mark.parametrize("name", ["rolling_disc", "particle_on_moving_slope", "double_wishbone", "andrews_squeezer", "car_axis"])
+@pytest.mark.parametrize("name", ["rolling_disc", "particle_on_moving_slope", "double_wishbone",
+                                  *swept(["andrews_squeezer", "car_axis"])])
 def test_identities_hold_under_constraints(name):
     assert not failed_of(sd.systems.get(name).augmented(), 2)
 
@@ -236,10 +242,12 @@ def test_one_wrong_quantity_under_constraints_is_found(linkage, quantity):
 
 
 @pytest.mark.parametrize("kind, row, entry, failing", [
-    ("revolute", "_tilt", "rest", "C_ddot = 0 along the motion"), ("prismatic", "_across", "rest", "C_ddot = 0 along the motion"),
-    ("rod", "_distance", "rest", "C_ddot = 0 along the motion"), ("revolute", "_tilt", "n_p", "C_dot is the rate of C"),
-    ("prismatic", "_across", "n_p", "C_dot is the rate of C"), ("planar", "_across", "f", "C_dot is the rate of C"),
-    ("universal", "_tilt", "n_c", "C_dot is the rate of C"), ("rod", "_distance", "f", "C_dot is the rate of C")])
+    ("revolute", "_tilt", "rest", "C_ddot = 0 along the motion"), ("prismatic", "_across", "n_p", "C_dot is the rate of C"),
+    ("rod", "_distance", "f", "C_dot is the rate of C"), *swept([
+        ("prismatic", "_across", "rest", "C_ddot = 0 along the motion"),
+        ("rod", "_distance", "rest", "C_ddot = 0 along the motion"),
+        ("revolute", "_tilt", "n_p", "C_dot is the rate of C"), ("planar", "_across", "f", "C_dot is the rate of C"),
+        ("universal", "_tilt", "n_c", "C_dot is the rate of C")])])
 @pytest.mark.filterwarnings("ignore::symdyn.ModelWarning")
 def test_a_row_with_a_wrong_sign_is_found(monkeypatch, kind, row, entry, failing):
     from symdyn.formulation.constraints import closures
