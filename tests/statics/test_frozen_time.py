@@ -94,8 +94,8 @@ def test_the_closed_form_of_the_rotor_gives_the_known_frequencies() -> None:
 
 
 @pytest.mark.every_value
-@pytest.mark.parametrize("W", [60.0, -60.0, 7.0])
-@pytest.mark.parametrize("attitude", ["parameters", "angles", "rates", "first"])
+@pytest.mark.parametrize("W", [60.0, -60.0, *swept([7.0])])
+@pytest.mark.parametrize("attitude", ["parameters", "angles", *swept(["rates"]), "first"])
 def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude: str, W: float) -> None:
     """Its coordinates do not matter; nothing is damped, so that it is neutral."""
     found = free_rotor(attitude).stability(fixed={SPEED[attitude]: W})
@@ -104,7 +104,7 @@ def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude
     assert "fixed frame" in repr(found)
 
 
-@pytest.mark.parametrize("attitude", [*swept(["parameters", "angles"]), "rates", "first"])
+@pytest.mark.parametrize("attitude", [*swept(["parameters", "angles", "rates"]), "first"])
 def test_the_campbell_diagram_of_a_free_rotor_is_of_the_fixed_frame(attitude: str) -> None:
     """At positive and negative speeds; with frame="rotating", position and tilt are seen from the turning axes, at |w - W|."""
     speeds = np.array([-60.0, -7.0, 7.0, 60.0])
@@ -200,7 +200,7 @@ def anisotropic(W: float, damped: bool = True) -> np.ndarray:
 
 
 @pytest.mark.every_value
-@pytest.mark.parametrize("W", [25.0, 60.0, -60.0])
+@pytest.mark.parametrize("W", [25.0, -60.0, *swept([60.0])])
 @pytest.mark.parametrize("attitude", ["parameters", "angles"])
 def test_a_damped_rotor_on_unlike_bearings_decays(attitude: str, W: float) -> None:
     """Floquet exponents in turning axes are the eigenvalues in the fixed frame, and no attitude makes it unstable."""
@@ -226,7 +226,7 @@ def turned_place() -> Any:
     return s.embedding().compile()
 
 
-@pytest.mark.parametrize("W", [4.0, 9.0, 30.0, -9.0])
+@pytest.mark.parametrize("W", [4.0, *swept([9.0, 30.0]), -9.0])
 def test_turning_axes_change_nothing_for_a_mass_on_fixed_springs(W: float) -> None:
     """5 and 13 rad/s at every speed of the axes, and no instability where the frozen stiffness is negative."""
     found = turned_place().stability(fixed={"phi_dot": W})
@@ -282,12 +282,13 @@ def unround(W: float) -> np.ndarray:
     return np.array([*roots, *-roots])
 
 
-SHAFTS = [("fixed", "held"), ("fixed", "prescribed"), ("turning", "held"), ("turning", "prescribed")]
+SHAFTS = swept([("fixed", "held"), ("fixed", "prescribed"), ("turning", "held"), ("turning", "prescribed")],
+               ("fixed", "held"), ("turning", "prescribed"))
 
 
 @pytest.mark.every_value
 @pytest.mark.parametrize(("axes", "turning"), SHAFTS)
-@pytest.mark.parametrize("W", [3.0, 9.5, 10.5, 11.0, 11.9, 12.5, 40.0])
+@pytest.mark.parametrize("W", [3.0, 11.0, *swept([9.5, 10.5, 11.9, 12.5, 40.0])])
 def test_a_shaft_that_is_not_round_is_unstable_between_its_two_critical_speeds(axes: str, turning: str, W: float) -> None:
     """10 and 12 rad/s; the rate of growth and every multiplier over a turn are those of the turning axes."""
     found = asked(shaft(axes, turning), W)
@@ -367,7 +368,7 @@ EDGES = [(mathieu_a, 0, 1), (mathieu_b, 1, -1), (mathieu_a, 1, 1), (mathieu_b, 2
 
 @pytest.mark.parametrize(("edge", "order", "bounded", "q"), swept(
     [(*edge, q) for edge in EDGES for q in (0.3, 1.0, 2.5) if edge[1] < 3 or q > 1],
-    *[(*edge, q) for edge, q in zip(EDGES[:3], (1.0, 2.5, 0.3), strict=True)]))
+    *[(*edge, q) for edge, q in zip(EDGES[:2], (1.0, 2.5), strict=True)]))
 def test_the_edges_of_mathieus_chart_to_a_millionth(edge: Any, order: int, bounded: int, q: float) -> None:
     """Characteristic values a_n(q), b_n(q); the upright pendulum, a < 0, is held up between a_0 and b_1. Source: DLMF 28.2."""
     a = float(edge(order, q))
@@ -383,7 +384,7 @@ def test_the_upright_pendulum_is_held_up_by_shaking() -> None:
     assert [mathieu(-0.3, q).verdict for q in (0.5, 1.0, 1.3)] == ["unstable", "neutral", "unstable"]
 
 
-@pytest.mark.parametrize(("a", "q"), [(3.0, 0.7), (1.0, 0.4), (-0.3, 1.0)])
+@pytest.mark.parametrize(("a", "q"), [(3.0, 0.7), (1.0, 0.4), *swept([(-0.3, 1.0)])])
 def test_damping_of_a_shaken_pendulum_is_in_the_product_of_its_multipliers(a: float, q: float) -> None:
     """exp(-d T). Source: Liouville's formula. Where Mathieu's equation is bounded, damping makes it stable."""
     d = 0.05
@@ -475,7 +476,8 @@ def test_ground_resonance_without_naming_the_blades(n: int, W: float) -> None:
         assert np.abs(np.asarray(found.exponents) - value).min() < 1e-8 * abs(value)
 
 
-@pytest.mark.parametrize("order", [("b1", "b2", "b3", "b4"), ("b1", "b3", "b2", "b4"), ("b2", "b1", "b3", "b4")])
+@pytest.mark.parametrize("order", [("b1", "b2", "b3", "b4"), ("b1", "b3", "b2", "b4"),
+                                   pytest.param(("b2", "b1", "b3", "b4"), marks=pytest.mark.sweep)])
 def test_blades_in_another_order_are_not_believed(order: tuple[str, ...]) -> None:
     """Multi-blade coordinates of blades that do not follow each other make nothing constant: the same verdict, or an error."""
     expected = upper(coleman(4, 12.0)[0])
@@ -489,7 +491,7 @@ def test_blades_in_another_order_are_not_believed(order: tuple[str, ...]) -> Non
         assert any(m.kind == "unstable" for m in modes)
 
 
-@pytest.mark.parametrize("n", [3, 4])
+@pytest.mark.parametrize("n", [3, *swept([4])])
 def test_campbell_diagram_of_a_helicopter_at_negative_speeds(n: int) -> None:
     """A mode keeps its name and its frequency where the rotor turns the other way round."""
     blades = [tuple(f"b{k + 1}" for k in range(n))]
@@ -561,7 +563,7 @@ def test_without_weight_the_rotor_is_at_rest_in_turning_axes() -> None:
     assert found.kind == "steady motion" and found.verdict == "unstable"
 
 
-@pytest.mark.parametrize("W", [3.0, 12.0])
+@pytest.mark.parametrize("W", [3.0, *swept([12.0])])
 def test_a_blade_that_swings_under_its_weight_comes_back_after_a_turn(W: float) -> None:
     """A heavy blade on a lag hinge; what is found is a motion of the simulation, and its multipliers those of its neighbours."""
     b = sd.coordinates("b")

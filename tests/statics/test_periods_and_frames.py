@@ -12,6 +12,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError
+from tests.helpers import swept
 from tests.statics.test_velocity_constraints import DISC, circling, circular_state, disc
 
 
@@ -48,7 +49,7 @@ def test_a_period_of_forces_that_is_not_theirs() -> None:
         module.stability(period=3.0)
 
 
-@pytest.mark.parametrize("turn", [0.4, 1.5])
+@pytest.mark.parametrize("turn", [0.4, *swept([1.5])])
 def test_a_motion_that_nothing_holds_is_judged_where_it_is(turn: float) -> None:
     """A disc in a circle, without its period: the disc spins faster than it goes round, and is not moved onto another motion."""
     theta = 1.2

@@ -15,12 +15,12 @@ from symdyn.lab.mechanisms import FEATURES, MOTIONS, TOPOLOGIES, draw, kinds_of
 from tests.helpers import swept
 
 # With these every topology, motion, feature and formulation occurs; 39 is compiled to C. More of them are in the sweep.
-NUMBERS = [0, 1, 3, 5, 6, 7, 10, 12, 14, 16, 18, 20, 21, 23, 39]
+NUMBERS = [1, 5, 6, 7, 10, 12, 14, 16, 20, 21, 23, 39]
 # Verdicts on these are compared besides.
 JUDGED = (0, 6, 12)
 
 
-@pytest.mark.parametrize("number", swept([*range(22), 23, 39], *NUMBERS))
+@pytest.mark.parametrize("number", swept([*range(24), 39], *NUMBERS))
 def test_matrices_are_the_derivative_of_the_flow(number: int) -> None:
     result = measure(number, verdicts=number in JUDGED)
     assert result.passed, str(result)

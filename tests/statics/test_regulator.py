@@ -14,6 +14,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.statics.regulator import Regulator, _out_of_reach
+from tests.helpers import swept
 
 
 @functools.cache
@@ -143,7 +144,7 @@ def test_held_coordinates_are_no_states() -> None:
 # -- the gain at work
 
 
-@pytest.mark.parametrize("module", [cart, rod])
+@pytest.mark.parametrize("module", [cart, *swept([rod])])
 def test_the_gain_brings_the_pole_upright(module: Any) -> None:
     linear = module().linearize()
     regulator = linear.lqr([1.0] * 4, [1.0])

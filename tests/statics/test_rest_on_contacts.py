@@ -13,6 +13,7 @@ from symdyn.contact_kinds import BODIES
 from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.runtime.integrating.contacts import Numbers
 from symdyn.statics.contact_rest import _Forces
+from tests.helpers import swept
 
 G = 9.81
 TILT, MU, FORCE, STIFFNESS = sd.parameters("tilt mu force stiffness")
@@ -56,8 +57,8 @@ def test_pushed_box_slides_or_tips_over(box: Any, mu: float) -> None:
     assert found.range("force") == (pytest.approx(-limit, rel=1e-12), pytest.approx(limit, rel=1e-12))
 
 
-@pytest.mark.parametrize("graph", [sd.contacts.Bore(1.0, [0, 1]), sd.contacts.Curve(1 - sp.sqrt(1 - sp.Symbol("x")**2),
-                                                                                    sp.Symbol("x"))])
+@pytest.mark.parametrize("graph", [*swept([sd.contacts.Bore(1.0, [0, 1])]),
+                                   sd.contacts.Curve(1 - sp.sqrt(1 - sp.Symbol("x")**2), sp.Symbol("x"))])
 def test_ball_in_a_bowl_that_is_tilted_rolls_to_where_it_rests(graph: Any) -> None:
     """At (R - r) sin(tilt) from the middle of the bowl, turned by the way over its radius, wherever the search begins."""
     system = sd.System("bowl", gravity=[G * sp.sin(TILT), -G * sp.cos(TILT)])
