@@ -143,6 +143,7 @@ def precise_end(name: str, change: Any) -> list[Any]:
     return list(run.x)
 
 
+@pytest.mark.sweep
 def test_double_pendulum_against_more_digits() -> None:
     """The error follows the tolerance, here against differences of motions of 22 digits."""
     names = ["m1", "l1", "q2(0)"]

@@ -231,6 +231,7 @@ def test_free_body_by_kane(sequence: str) -> None:
     agrees(s, kane(N, q, u, rates, [rigid("box", G, B, 3, (2, 3, 4))], [(G, -27 * N.z), (A, N.x + 2 * N.y)]))
 
 
+@pytest.mark.sweep
 def test_screw_by_kane() -> None:
     pitch = fifth
     s = sd.System("screw", gravity=[0, -2, -9])

@@ -187,7 +187,8 @@ def test_a_product_and_a_difference_for_each_set_of_angles(form: str, monkeypatc
     assert added(free_body("angles"), form, monkeypatch, "jacobian_x") == 2
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "n_link_pendulum", "spatial_chain", "puma560", "cart_pole", "four_bar"])
+@pytest.mark.parametrize("name", [*swept(["double_pendulum"]), "n_link_pendulum", *swept(["spatial_chain"]), "puma560",
+                                  *swept(["cart_pole"]), "four_bar"])
 def test_nothing_for_links_with_mass_and_one_freedom_each(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for form in ("augmented",) if name == "four_bar" else FORMS:
         assert added(get(name), form, monkeypatch) == 0
@@ -370,6 +371,7 @@ def on_a_rod() -> sd.System:
     return s
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize(("make", "way", "place", "values"), [
     (beside_a_cart, "Schur complement", 4, (RIGHT, -RIGHT)),
     (on_a_rod, "elimination of the dependent speeds", 4, (RIGHT, -RIGHT)),
@@ -442,8 +444,8 @@ def points_and_plate(turns: Any, constraint: bool) -> sd.System:
     return s
 
 
-@pytest.mark.parametrize("turns", [lambda a, b: sp.rot_ccw_axis3(a) * sp.rot_ccw_axis1(b),
-                                   lambda a, b: sp.rot_ccw_axis1(a) * sp.rot_ccw_axis2(b)], ids=["zx", "xy"])
+@pytest.mark.parametrize("turns", [pytest.param(lambda a, b: sp.rot_ccw_axis3(a) * sp.rot_ccw_axis1(b), id="zx"), pytest.param(
+    lambda a, b: sp.rot_ccw_axis1(a) * sp.rot_ccw_axis2(b), id="xy", marks=pytest.mark.sweep)])
 def test_accelerations_where_several_links_together_hold_a_speed(turns: Any) -> None:
     """Against the saddle-point system of the tree's own M_tilde, k_tilde, F_tilde without the constraint."""
     free = points_and_plate(turns, False).embedding()
