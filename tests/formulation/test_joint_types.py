@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -31,6 +32,7 @@ Rx, Ry, Rz = sp.rot_ccw_axis1, sp.rot_ccw_axis2, sp.rot_ccw_axis3
 QUANTITIES = ("M_tilde", "k_tilde", "F_tilde", "J", "Jdot", "Jd_qd", "energy", "power", "accelerations", "rates")
 
 
+@functools.cache
 def mechanism(joint: Callable[..., Any], *extra: sp.Symbol, tip: bool = True,
               derive: Callable[[sd.System], Any] = sd.System.embedding) -> Any:
     """A body on the joint, on a base that slides and turns, and a body hinged to it; with forces."""

@@ -122,11 +122,11 @@ CURVE = CubicSpline(np.linspace(-3, 3, 70), 0.1 * np.cos(2 * np.linspace(-3, 3, 
 WAVES = sp.sin(X) * Y / 3
 # Planar or not, shape, ground, whether the contact yields, how many inputs: splines take longer in Python.
 SHAPES: dict[str, tuple[bool, Any, Any, bool, int]] = {
-    "circle on a curve": (True, Shapes.Sphere(0.3), Shapes.Curve(sp.sin(X) / 3, X), False, INPUTS),
-    "sphere on a surface": (False, Shapes.Sphere(0.3), Shapes.Surface(WAVES, X, Y), False, INPUTS // 4),
-    "yielding sphere": (False, Shapes.Sphere(0.3), Shapes.Surface(WAVES, X, Y), True, INPUTS // 4),
-    "disc on a surface": (False, Shapes.Disc(0.3, [0, 1, 0]), Shapes.Surface(WAVES, X, Y), False, INPUTS // 8),
-    "circle on a spline": (True, Shapes.Sphere(0.3), Shapes.Curve(CURVE, X), False, INPUTS // 20),
+    "circle on a curve": (True, Shapes.Sphere(0.3), Shapes.Curve(sp.sin(X) / 3, X), False, INPUTS // 5),
+    "sphere on a surface": (False, Shapes.Sphere(0.3), Shapes.Surface(WAVES, X, Y), False, INPUTS // 10),
+    "yielding sphere": (False, Shapes.Sphere(0.3), Shapes.Surface(WAVES, X, Y), True, INPUTS // 10),
+    "disc on a surface": (False, Shapes.Disc(0.3, [0, 1, 0]), Shapes.Surface(WAVES, X, Y), False, INPUTS // 25),
+    "circle on a spline": (True, Shapes.Sphere(0.3), Shapes.Curve(CURVE, X), False, INPUTS // 50),
     "torus on a spline": (False, Shapes.Torus(0.3, 0.05, [0, 1, 0]), Shapes.Surface(GRID, X, Y), False, INPUTS // 100)}
 
 
