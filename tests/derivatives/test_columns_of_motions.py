@@ -47,7 +47,6 @@ CASES = [("puma560", {"torques": True}, "embedding", ("m2", "tau3", "", "I3_yy",
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize(("name", "options", "formulation", "by"), CASES)
 def test_both_ways_agree(name: str, options: Any, formulation: str, by: tuple[str, ...], held: bool) -> None:

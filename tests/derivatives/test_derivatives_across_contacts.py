@@ -220,7 +220,6 @@ SLOPES = [(1.0, -1.0, 1.5), (2.0, -2.0, 1.0), (2.0, 1.0, 1.0), (0.2, -1.0, 1.0)]
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("rtol", [1e-8, 1e-11])
 @pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)
 def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float, vx: float, vy: float, rtol: float) -> None:
@@ -238,7 +237,6 @@ def test_mass_that_turns_down_a_slope_until_it_sticks(in_space: Any, down: float
             assert np.abs(run.sensitivity[one][-1, 2:]).max() < 1e-12
 
 
-@pytest.mark.every_value
 @pytest.mark.every_value
 @pytest.mark.parametrize("method", ["dop853", "bs54"])
 @pytest.mark.parametrize(("down", "vx", "vy"), SLOPES)

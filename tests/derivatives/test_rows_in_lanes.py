@@ -23,7 +23,6 @@ def states(module: Any, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize(("name", "form"), [("puma560", "embedding"), ("four_bar", "augmented")])
 @pytest.mark.parametrize("n", [3, 8, 203])  # fewer than lanes, as many, and some left over
 def test_bits_of_each_state(name: str, form: str, n: int) -> None:

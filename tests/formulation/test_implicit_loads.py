@@ -192,7 +192,6 @@ def ladder_by_hand(angle, spin, friction):
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ("numpy", "c"))
 @pytest.mark.parametrize("seed", swept(range(8), 0, 1, 2))
 def test_two_frictions_at_once(seed, backend):

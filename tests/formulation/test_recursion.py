@@ -39,7 +39,6 @@ def same(a: Any, b: Any) -> bool:
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", swept(SEEDS, *SEEDS[:10]))
 def test_random_trees(seed: int, form: tuple[str, str]) -> None:
@@ -49,7 +48,6 @@ def test_random_trees(seed: int, form: tuple[str, str]) -> None:
         assert same(a, b), name
 
 
-@pytest.mark.every_value
 @pytest.mark.every_value
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", [*SEEDS][:6])

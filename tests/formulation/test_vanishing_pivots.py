@@ -301,7 +301,6 @@ CASES: dict[str, tuple[Callable[[], sd.System], int, tuple[float, ...], str]] = 
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("case", CASES)

@@ -160,7 +160,6 @@ def differences(module: Any, linear: Any, values: dict[str, float]) -> tuple[np.
 
 
 @pytest.mark.every_value
-@pytest.mark.every_value
 @pytest.mark.parametrize("moving", [False, True], ids=["still", "moving"])
 @pytest.mark.parametrize(("name", "form"), [("winch", "relative"), ("winch", "absolute"), ("swing", "absolute"),
                                             ("four_bar", "relative"), ("four_bar", "absolute"), ("sleigh", "relative")])
