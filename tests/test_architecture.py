@@ -51,7 +51,7 @@ def files() -> list[File]:
             for path, tree in package_trees().items() if path not in ("__init__.py", "__main__.py")]
 
 
-# What holds the name of a kind of node.
+# Attributes that hold the name of a kind of node.
 NAMED = {ast.Name: "id", ast.arg: "arg", ast.FunctionDef: "name", ast.ClassDef: "name"}
 
 

@@ -89,12 +89,13 @@ def test_the_stub_has_the_public_names_and_where_they_are() -> None:
 
 
 def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path, pytestconfig: pytest.Config) -> None:
-    """With what mypy keeps from one run to the next, it reads only files that have changed."""
+    """mypy keeps what it has read, so that it reads only files that have changed since the last run."""
     file = tmp_path / "user.py"
     file.write_text(USER + "".join(f"reveal_type({expression})\n" for expression in REVEALED), encoding="utf-8")
     settings = tmp_path / "mypy.ini"
     settings.write_text(SETTINGS, encoding="utf-8")
-    cache = pytestconfig.cache.mkdir("mypy") if pytestconfig.cache else os.devnull
+    kept = getattr(pytestconfig, "cache", None)  # None without the plugin of pytest that keeps it
+    cache = kept.mkdir("mypy") if kept else os.devnull
     command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(settings), "--cache-dir", str(cache), str(file)]
     found = subprocess.run(command, capture_output=True, text=True, cwd=STUB.parent.parent, check=False)
     assert found.returncode == 0, found.stdout
