@@ -46,6 +46,13 @@ q1 = {{from = -1, to = 1}}
 """
 
 
+@pytest.fixture(autouse=True)
+def short_measurements(monkeypatch):
+    """Dry runs within tests measure for a moment: what they predict need not be exact."""
+    monkeypatch.setattr(prediction, "LEAST", 0.01)
+    monkeypatch.setattr(prediction, "TRIAL_BYTES", 2**21)
+
+
 def write(folder, more="", table="", count=400, chunk=20):
     path = folder / "sweep.toml"
     path.write_text(SWEEP.format(more=more, table=table, count=count, chunk=chunk))
