@@ -9,8 +9,9 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -46,18 +47,27 @@ def run(*command: object, cwd: Path, seconds: float = 300) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The wheel of this checkout; with the build tools of this environment if they are here, else fetched ones."""
-    folder = tmp_path_factory.mktemp("wheel")
-    try:
-        import hatchling  # noqa: F401
+def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """built(kind): the wheel or the sdist of this checkout; the build backend is fetched once if it is not here."""
+    fetched = tmp_path_factory.mktemp("backend")
+    if importlib.util.find_spec("hatchling") is None:
+        wanted = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]["requires"]
+        run(sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile", "--target", fetched,
+            *wanted, cwd=fetched)
 
-        isolation = ["--no-build-isolation"]
-    except ImportError:
-        isolation = []
-    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", *isolation, "-w", folder, ROOT, cwd=folder)
-    (path,) = folder.glob("symdyn-*.whl")
-    yield path
+    def made(kind: str) -> Path:
+        folder = tmp_path_factory.mktemp(kind)
+        run(sys.executable, "-c", f"import sys; sys.path.insert(0, {str(fetched)!r}); from hatchling.build import build_{kind}; "
+            f"build_{kind}({str(folder)!r})", cwd=ROOT)
+        (path,) = folder.glob("symdyn-*")
+        return path
+
+    return made
+
+
+@pytest.fixture(scope="module")
+def wheel(built: Callable[[str], Path]) -> Path:
+    return built("wheel")
 
 
 def test_wheel_holds_templates_and_code_only(wheel: Path) -> None:
@@ -70,15 +80,12 @@ def test_wheel_holds_templates_and_code_only(wheel: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unpacked(built: Callable[[str], Path]) -> Path:
     """The folder in an sdist of this checkout."""
-    folder = tmp_path_factory.mktemp("sdist")
-    isolation = [] if importlib.util.find_spec("hatchling") is None else ["--no-isolation"]
-    run(sys.executable, "-m", "build", "--sdist", *isolation, "-o", folder, ROOT, cwd=folder)
-    (path,) = folder.glob("symdyn-*.tar.gz")
+    path = built("sdist")
     with tarfile.open(path) as archive:
-        archive.extractall(folder, filter="data")
-    return folder / path.name.removesuffix(".tar.gz")
+        archive.extractall(path.parent, filter="data")
+    return path.parent / path.name.removesuffix(".tar.gz")
 
 
 def test_sdist_holds_what_both_commands_of_the_readme_need(unpacked: Path) -> None:
@@ -91,6 +98,7 @@ def test_sdist_holds_what_both_commands_of_the_readme_need(unpacked: Path) -> No
     assert not [name for name in there if "__pycache__" in name or name.startswith((".venv", ".git/"))]
 
 
+@pytest.mark.sweep
 def test_commands_of_the_readme_in_an_unpacked_sdist(unpacked: Path) -> None:
     """As an editable installation runs them; of the tests those that need files next to the package."""
     printed = run(sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(unpacked)!r}); "
@@ -123,8 +131,8 @@ def test_installed_elsewhere(wheel: Path, tmp_path: Path) -> None:
     base = Path(sys.base_prefix) / ("python.exe" if sys.platform == "win32" else f"bin/python{sys.version_info[0]}")
     run(base, "-m", "venv", "--without-pip", tmp_path / "venv", cwd=tmp_path)
     python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--disable-pip-version-check", "--no-deps",
-        "--no-index", wheel, cwd=tmp_path)
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--disable-pip-version-check", "--no-compile",
+        "--no-deps", "--no-index", wheel, cwd=tmp_path)
     packages = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=tmp_path).strip())
     for distribution in required(wheel).values():
         for name in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
