@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import zipfile
 from pathlib import Path
 
@@ -11,11 +13,13 @@ import pytest
 import symdyn as sd
 from symdyn.lab.fmus import WAYS, compared, validated
 from symdyn.runtime.building.compiler import find_compiler
+from tests.helpers import swept
 
 fmpy = pytest.importorskip("fmpy")
 pytestmark = [pytest.mark.skipif(find_compiler() is None, reason="no C compiler"), pytest.mark.native]
 
 
+@functools.cache
 def _ball(stop: bool = False) -> sd.System:
     y = sd.coordinates("y")
     m, g = sd.parameters("m g", positive=True)
@@ -35,21 +39,27 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("fmus")
 
 
-@pytest.fixture(scope="module")
-def arm() -> sd.System:
-    return sd.systems.two_link_arm()
+@functools.cache
+def _compiled(name: str):
+    return sd.systems.get(name).compile(backend="c")
 
 
 @pytest.fixture(scope="module")
-def module(arm: sd.System):
-    return arm.compile(backend="c")
+def module():
+    return _compiled("two_link_arm")
 
 
 @pytest.fixture(scope="module")
-def instance(module, folder: Path):
+def written(folder: Path):
+    """written(name, version, kind): the FMU of a mechanism of the catalogue, written once."""
+    return functools.cache(lambda name, version=3, kind="co_simulation": _compiled(name).to_fmu(
+        folder / f"{name}{version}{kind}.fmu", version, kind))
+
+
+@pytest.fixture(scope="module")
+def instance(written, folder: Path):
     """An instance in initialization mode, its references by name, and where it was extracted to."""
-    path = module.to_fmu(folder / "instance.fmu", 3, "model_exchange")
-    return _instances(path, folder / "extracted", 1)
+    return _instances(written("two_link_arm", 3, "model_exchange"), folder / "extracted", 1)
 
 
 def _instances(path: Path, where: Path, n: int):
@@ -68,16 +78,15 @@ def _instances(path: Path, where: Path, n: int):
     return made, {v.name: v.valueReference for v in description.modelVariables}
 
 
-@pytest.mark.parametrize("version", [3, 2])
-@pytest.mark.parametrize("kind", ["co_simulation", "model_exchange"])
-@pytest.mark.parametrize("name", ["two_link_arm", "slider_crank"])
-def test_fmpy_finds_no_fault_and_simulates_as_symdyn_does(name, version, kind, folder):
-    system = sd.systems.get(name)
-    module = system.compile(backend="c")
-    path = module.to_fmu(folder / f"{name}{version}{kind}.fmu", version, kind)
+@pytest.mark.parametrize(("name", "version", "kind"), swept(
+    itertools.product(("two_link_arm", "slider_crank"), (3, 2), ("co_simulation", "model_exchange")),
+    ("two_link_arm", 3, "model_exchange"), ("two_link_arm", 2, "model_exchange"), ("two_link_arm", 2, "co_simulation"),
+    ("slider_crank", 3, "co_simulation")))
+def test_fmpy_finds_no_fault_and_simulates_as_symdyn_does(name, version, kind, written):
+    path = written(name, version, kind)
     assert validated(path) == []
     # The integrator of FMPy's model exchange is CVODE, whose error this is.
-    assert compared(module, path, 1.0) < (1e-12 if kind == "co_simulation" else 1e-9)
+    assert compared(_compiled(name), path, 1.0) < (1e-12 if kind == "co_simulation" else 1e-9)
 
 
 def test_the_sweep_goes_through_all_ways():
@@ -85,8 +94,8 @@ def test_the_sweep_goes_through_all_ways():
 
 
 @pytest.mark.parametrize("version", [3, 2])
-def test_parameters_inputs_and_start_values_are_set_by_the_importer(module, version, folder):
-    path = module.to_fmu(folder / f"set{version}.fmu", version)
+def test_parameters_inputs_and_start_values_are_set_by_the_importer(module, version, written):
+    path = written("two_link_arm", version)
     values = {"m1": 2.0, "q1": 0.4, "q2_dot": -0.5, "tau1": 3.0}
     found = fmpy.simulate_fmu(str(path), stop_time=1.0, output_interval=0.25, relative_tolerance=1e-12, start_values=values,
                               output=["q1", "tip[2]", "energy.kinetic", "energy.potential"])
@@ -97,9 +106,9 @@ def test_parameters_inputs_and_start_values_are_set_by_the_importer(module, vers
     assert np.allclose(found["energy.kinetic"] + found["energy.potential"], sol.energy, rtol=0, atol=1e-10)
 
 
-def test_an_input_that_changes_takes_effect_at_its_step(module, folder):
+def test_an_input_that_changes_takes_effect_at_its_step(module, written):
     """A torque that is held over steps, compared with the same torque by sd.Sampled."""
-    path = module.to_fmu(folder / "held.fmu", 3)
+    path = written("two_link_arm")
     times = np.arange(0, 1.05, 0.1)
     held = np.round(np.sin(5 * times), 3)
     # FMPy takes the value that holds after a jump: two rows at each time.
@@ -127,6 +136,7 @@ def test_resets_at_events_are_those_of_the_closed_form(version, kind, folder):
     assert np.allclose(found["y"], y, rtol=0, atol=1e-12 if kind == "co_simulation" else 1e-8)
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("version", [3, 2])
 @pytest.mark.parametrize("kind", ["co_simulation", "model_exchange"])
 def test_an_event_that_stops_ends_the_simulation(version, kind, folder):
@@ -171,9 +181,8 @@ def test_directional_and_adjoint_derivatives_are_the_exact_jacobian(module, inst
     assert np.allclose(back, np.arange(8) @ whole, rtol=1e-13, atol=1e-13)
 
 
-def test_a_copy_of_the_state_goes_on_to_the_same_bits_in_another_instance(module, folder):
-    path = module.to_fmu(folder / "copies.fmu", 3)
-    (one, two), at = _instances(path, folder / "copies", 2)
+def test_a_copy_of_the_state_goes_on_to_the_same_bits_in_another_instance(module, written, folder):
+    (one, two), at = _instances(written("two_link_arm"), folder / "copies", 2)
     states = [at[n] for n in module.metadata.x]
     for k in (one, two):
         k.enterInitializationMode(startTime=0.0, stopTime=5.0)
@@ -198,9 +207,8 @@ def test_a_copy_of_the_state_goes_on_to_the_same_bits_in_another_instance(module
         k.freeInstance()
 
 
-def test_a_hundred_instances_share_nothing(module, folder):
-    path = module.to_fmu(folder / "hundred.fmu", 3)
-    many, at = _instances(path, folder / "hundred", 100)
+def test_a_hundred_instances_share_nothing(module, written, folder):
+    many, at = _instances(written("two_link_arm"), folder / "hundred", 100)
     starts = np.linspace(-1, 1, 100)
     for one, q1 in zip(many, starts, strict=True):
         one.enterInitializationMode(tolerance=1e-11, startTime=0.0, stopTime=1.0)
@@ -243,7 +251,7 @@ def test_states_between_long_steps_are_not_interpolated(folder):
     assert compared(module, path, 1.0, "dop853") < 1e-11
 
 
-@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("version", swept([2, 3], 3))
 def test_derivatives_of_model_exchange_are_those_of_simulate(version, folder):
     """Derivatives of a mechanism whose motion by FMPy's CVODE is off by more than 1e-9 at the same tolerance."""
     module = sd.systems.car_axis().compile(backend="c")
@@ -251,8 +259,8 @@ def test_derivatives_of_model_exchange_are_those_of_simulate(version, folder):
     assert compared(module, path, 0.5, "dop853") < 1e-11
 
 
-def test_sources_are_inside_and_the_same_mechanism_has_the_same_bytes(module, folder):
-    first = module.to_fmu(folder / "first.fmu", 2, "model_exchange")
+def test_sources_are_inside_and_the_same_mechanism_has_the_same_bytes(module, written, folder):
+    first = written("two_link_arm", 2, "model_exchange")
     with zipfile.ZipFile(first) as archive:
         names = archive.namelist()
         units = archive.read("modelDescription.xml").decode()
@@ -298,15 +306,13 @@ def test_what_an_fmu_cannot_have_is_rejected(module, folder, arguments, message)
 
 
 def test_a_start_off_the_constraints_is_rejected(folder):
-    module = sd.systems.slider_crank().compile(backend="c")
     with pytest.raises(sd.ArgumentError, match="violate"):
-        module.to_fmu(folder / "off.fmu", q=[0.3, 2.0])
+        _compiled("slider_crank").to_fmu(folder / "off.fmu", q=[0.3, 2.0])
 
 
-def test_the_importer_is_warned_of_values_that_make_no_sense(folder):
+def test_the_importer_is_warned_of_values_that_make_no_sense(written, folder):
     """A state that cannot be put onto the constraints, a parameter that is not finite, steps backward: errors with a message."""
-    module = sd.systems.slider_crank().compile(backend="c")
-    path = module.to_fmu(folder / "crank.fmu", 3)
+    module, path = _compiled("slider_crank"), written("slider_crank")
     messages: list[str] = []
     description = fmpy.read_model_description(str(path))
     from fmpy.fmi3 import FMU3Slave

@@ -15,6 +15,7 @@ from symdyn.errors import UnsupportedExpression
 from symdyn.lab.languages import PROGRAMS, built, program_for
 from symdyn.lab.targets import compared
 from symdyn.pipeline import emit, write_source
+from tests.helpers import swept
 from tests.mechanisms import strange
 
 needed = {language: pytest.mark.skipif(program_for(language) is None, reason=f"there is no {program}")
@@ -24,7 +25,7 @@ WORDS = ("fortran", "julia", "matlab", "rust")
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("name", ["strange", "two_link_arm", pytest.param("bricard", marks=pytest.mark.sweep)])
+@pytest.mark.parametrize("name", swept(["strange", "two_link_arm", "bricard"], "strange"))
 def test_all_functions_give_their_reference_vectors(name: str, language: str, tmp_path: Path) -> None:
     system = strange() if name == "strange" else sd.systems.get(name)
     equations = system.augmented() if system.loops else system.embedding()
@@ -110,6 +111,7 @@ def test_a_wrong_result_is_found(language: str, tmp_path: Path) -> None:
     assert found.returncode != 0 and "rhs: wrong" in found.stdout
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("name", ["cart_pole", "slider_crank"])
 def test_random_states_agree_with_c(name: str, language: str) -> None:
@@ -130,7 +132,7 @@ def test_a_value_that_must_be_positive_and_is_not(language: str, tmp_path: Path)
 def test_julia_has_no_fault_of_syntax() -> None:
     tree_sitter, grammar = pytest.importorskip("tree_sitter"), pytest.importorskip("tree_sitter_julia")
     parser = tree_sitter.Parser(tree_sitter.Language(grammar.language()))
-    for equations in (strange().embedding(), sd.systems.get("bricard").augmented(), driven_by_functions("julia").embedding()):
+    for equations in (strange().embedding(), sd.systems.four_bar().augmented(), driven_by_functions("julia").embedding()):
         for name, text in emit(equations, "julia").files.items():
             assert not parser.parse(text.encode()).root_node.has_error, name
     assert parser.parse(b"function f(x)\n x +* 2\nend\n").root_node.has_error
