@@ -27,9 +27,9 @@ QUICKLY = {
 # Commands of compilers, which workers inherit: for most tests, and for those of generated C.
 QUICK, NATIVE = "SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"
 NATIVE_FOLDERS = "backend", "bench", "gpu"
-# Notebooks that the suite runs: a derivation by hand with proofs, slides compared, a motion under control with films, and an arm
-# from a file, whose views turn. All others are in the sweep.
-NOTEBOOKS = "pendulum_by_hand", "compare_your_slides", "crane_with_controller", "robot_arm_from_urdf"
+# Notebooks that the suite runs: a derivation by hand with proofs, and a motion under control with films. All others are in the
+# sweep.
+NOTEBOOKS = "pendulum_by_hand", "crane_with_controller"
 for _name, _value in QUICKLY.items():
     os.environ.setdefault(_name, _value)
 EARLY = sys.modules.get("numpy")  # imported by another plugin of pytest, before this is read

@@ -10,23 +10,28 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers import swept
 from tests.running import run_program
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
 NAMES = {page: page.relative_to(ROOT / "docs").with_suffix("").as_posix() for page in PAGES}
-PAGE_OF = {name: page for page, name in NAMES.items()}
 
 # Pages whose code takes seconds, of kinds that others have too: the sweep runs it.
-LONG = [PAGE_OF[name] for name in ("contact", "derivatives", "optimal_motion", "pictures", "work_against_error")]
+LONG = "choosing_a_method", "contact", "derivatives", "optimal_motion", "pictures", "work_against_error"
+# Pages that show numbers of steps, which are those with fused operations, or write libraries that tcc does not compile.
+NATIVE = "choosing_a_method", "contact", "fmu", "other_libraries", "start"
+
+
+def marks(page: Path) -> list[pytest.MarkDecorator]:
+    name = NAMES[page]
+    return [mark for mark, pages in ((pytest.mark.sweep, LONG), (pytest.mark.native, NATIVE)) if name in pages]
+
 
 # They are texts of the project's folder on the site.
 OF_THE_PROJECT = "contributing", "changes"
 
 
-@pytest.mark.native  # numbers of steps that pages show are those with fused operations
-@pytest.mark.parametrize("page", swept(PAGES, *[page for page in PAGES if page not in LONG]), ids=NAMES.get)
+@pytest.mark.parametrize("page", [pytest.param(page, marks=marks(page)) for page in PAGES], ids=NAMES.get)
 def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     """All blocks of a page run one after the other; what they print is what the text blocks show, to the last character."""
     text = page.read_text(encoding="utf-8")
