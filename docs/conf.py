@@ -19,7 +19,7 @@ release = version = symdyn.__version__
 html_title = f"symdyn {version}"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "docstrings", "gallery", "mathml", "measured",
-              "tables", "tolerance", "tutorials", "outside"]
+              "navigation", "tables", "tolerance", "tutorials", "outside"]
 exclude_patterns = ["extensions"]
 root_doc = "index"
 source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".myst": "markdown"}

@@ -72,7 +72,8 @@ def test_the_same_as_the_module_at_1000_states(name: str, through: str) -> None:
 
 @pytest.mark.parametrize(("name", "through"), swept(
     [(name, through) for name in ("four_bar", "pendulum_absolute", "floating_crane", "two_link_arm", "cart_pole")
-     for through in THROUGH], ("pendulum_absolute", "xla"), *[(name, through) for name in ("floating_crane", "two_link_arm") for through in THROUGH[1:]]))
+     for through in THROUGH],
+    ("pendulum_absolute", "xla"), *[(name, through) for name in ("floating_crane", "two_link_arm") for through in THROUGH[1:]]))
 def test_derivatives_are_exact(name: str, through: str) -> None:
     """Forward and backward, by state, parameters and inputs, compared with those of the module."""
     equations, module = made(name)
