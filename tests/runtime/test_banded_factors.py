@@ -73,10 +73,10 @@ def test_orders_solve_random_systems(seed: int) -> None:
 
 def test_orders_of_mechanisms() -> None:
     """Two coordinates a knot: diagonals up to the next knot's last speed, whatever the cable's length and the order of names."""
-    for n in (10, 40):
+    for n in (10, 20):
         band = elastic_cable(n).embedding().compile(backend="numpy").jacobian_indices().band
         assert (band.reduced, band.size, band.lower, band.upper) == (2 * n - 2, 2 * n - 2, 3, 3) and band.pays
-    for name, options in (("double_pendulum", {}), ("n_link_pendulum", {"n": 12}), ("cart_pole", {})):
+    for name, options in (("double_pendulum", {}), ("n_link_pendulum", {"n": 8}), ("cart_pole", {})):
         assert not sd.systems.get(name, **options).compile(backend="numpy").jacobian_indices().band.pays
 
 
@@ -91,10 +91,10 @@ def test_work_follows_from_the_others() -> None:
 
 
 def pushed() -> sd.System:
-    """A cable of 50 links with a force on the knot in its middle, and an event there."""
-    system = elastic_cable(50)
-    system.add_joint_force("up25", sd.inputs("F"))
-    system.add_event("low", sd.coordinates("y25") + 0.005)
+    """A cable of 20 links with a force on the knot in its middle, and an event there."""
+    system = elastic_cable(20)
+    system.add_joint_force("up10", sd.inputs("F"))
+    system.add_event("low", sd.coordinates("y10") + 0.005)
     return system
 
 
@@ -127,7 +127,7 @@ def test_cables_move_as_with_dense_factors(cable: Any, whole: Any, method: str, 
     assert banded.success and 1e-15 < errors[0] <= 2 * errors[1] and errors[1] <= at / 10
     assert banded.n_steps <= 1.3 * full.n_steps and banded.nlu <= 0.8 * full.nlu
     assert [NAME in module.library(RightSide(method=method)).metadata.shapes for module in (cable, whole)] == [True, False]
-    assert (banded.factors, exact.factors) == ("banded: 98 of 196 states, 3 diagonals below and 3 above the main one", "")
+    assert (banded.factors, exact.factors) == ("banded: 38 of 76 states, 3 diagonals below and 3 above the main one", "")
 
 
 @needs_c
@@ -145,10 +145,10 @@ def test_events_states_between_steps_and_motions_backwards(cable: Any) -> None:
     assert len(exact.events["low"].t) == 1
     np.testing.assert_allclose(found.events["low"].t, exact.events["low"].t, rtol=0, atol=1e-8)
     between = np.linspace(0.001, 0.049, 17)
-    assert np.abs(found(between) - exact(between))[:, :98].max() <= 1e-7
+    assert np.abs(found(between) - exact(between))[:, :38].max() <= 1e-7
     # Damped motions grow backwards: a short way.
     start = exact.x[-1]
-    back = [cable.simulate([0.05, 0.0498], start[:98], start[98:], events=False, **{**given, **more}).q[-1]
+    back = [cable.simulate([0.05, 0.0498], start[:38], start[38:], events=False, **{**given, **more}).q[-1]
             for more in ({"method": "dop853", **TIGHT}, {})]
     assert np.abs(back[0] - back[1]).max() <= 1e-8
 
@@ -161,7 +161,7 @@ def test_sensitivities_take_the_factors_of_the_state(cable: Any) -> None:
     ends = [cable.simulate([0, 0.02], inputs=[0.3], params={"m": m * (1 + h)}, events=False, **TIGHT).q[-1]
             for h in (-1e-3, 1e-3)]
     wanted = (ends[1] - ends[0]) / (2e-3 * m)
-    assert np.abs(found.sensitivity["m"][-1, :98] - wanted).max() <= 1e-4 * np.abs(wanted).max()
+    assert np.abs(found.sensitivity["m"][-1, :38] - wanted).max() <= 1e-4 * np.abs(wanted).max()
     assert found.factors.startswith("banded")
 
 
@@ -184,16 +184,16 @@ def bodies_on_bushings(n: int) -> sd.System:
 
 @needs_c
 def test_rates_that_are_sums_of_speeds_stay_in_the_band() -> None:
-    module = bodies_on_bushings(12).embedding().compile(backend="c")
+    module = bodies_on_bushings(8).embedding().compile(backend="c")
     band = module.jacobian_indices().band
-    assert band.pays and band.reduced == 36 and band.size == 108 and max(band.lower, band.upper) <= 30
-    found, exact = (module.simulate([0, 0.2], **given) for given in ({"method": "radau", "rtol": 1e-9, "atol": 1e-11}, TIGHT))
+    assert band.pays and band.reduced == 24 and band.size == 72 and max(band.lower, band.upper) <= 30
+    found, exact = (module.simulate([0, 0.1], **given) for given in ({"method": "radau", "rtol": 1e-9, "atol": 1e-11}, TIGHT))
     assert found.success and np.abs(found.x[-1] - exact.x[-1]).max() <= 1e-6
 
 
 @needs_c
 def test_members_of_ensembles_have_factors_in_bands_here_and_in_other_processes() -> None:
-    module = elastic_cable(30).embedding().compile(backend="c")
+    module = elastic_cable(15).embedding().compile(backend="c")
     damping, names = [40.0, 60.0], module.metadata.q
     alone = [module.simulate((0, 0.01), params={"d": d}, method="radau5").q[-1] for d in damping]
     with ProcessPoolExecutor(1) as executor:
@@ -219,35 +219,37 @@ def test_factors_serve_again_while_derivative_and_length_stay() -> None:
 @needs_c
 def test_memory_grows_with_the_number_of_states() -> None:
     sizes = []
-    for n in (25, 50, 100):
+    for n in (10, 20, 40):
         library = elastic_cable(n).embedding().compile(backend="c").library(RightSide(method="radau5"))
         size = library.function("simulation_size")
         size.restype = ctypes.c_long
         sizes.append(size())
-    assert (sizes[2] - sizes[1]) == pytest.approx(2 * (sizes[1] - sizes[0]), rel=0.01) and sizes[2] < 8 * 396 * 100
+    assert (sizes[2] - sizes[1]) == pytest.approx(2 * (sizes[1] - sizes[0]), rel=0.01) and sizes[2] < 8 * 156 * 100
 
 
 @needs_c
 def test_a_long_cable_runs_where_dense_matrices_do_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bound counts what is taken: the band's matrices pass, dense ones do not, and smaller bounds reject bands."""
-    module = elastic_cable(100).embedding().compile(backend="c")
-    band = 8 * (396 // 2 * 10 * 4 + len(module.jacobian_indices().rows))
+    module = elastic_cable(50).embedding().compile(backend="c")
+    band = 8 * (196 // 2 * 10 * 4 + len(module.jacobian_indices().rows))
     monkeypatch.setattr(methods, "LARGEST_MATRICES", band)
     assert module.simulate((0, 0.001), method="radau5").success
     monkeypatch.setattr(methods, "LARGEST_MATRICES", band - 1)
-    with pytest.raises(ArgumentError, match=r"its matrices of 396 states take 0\.0 GiB; use method='Radau' of SciPy, whose"):
+    with pytest.raises(ArgumentError, match=r"its matrices of 196 states take 0\.0 GiB; use method='Radau' of SciPy, whose"):
         module.simulate((0, 0.001), method="radau5")
     dense(monkeypatch)
-    with pytest.raises(ArgumentError, match=r"its matrices of 396 states take"):
+    with pytest.raises(ArgumentError, match=r"its matrices of 196 states take"):
         module.simulate((0, 0.001), method="radau5")
 
 
 @needs_c
 def test_reports_say_how_matrices_were_factorized(cable: Any) -> None:
     given = {"inputs": [0.0], "events": False}
-    found = {method: cable.simulate([0, 0.001], method=method, **given) for method in ("radau5", "Radau", "dop853")}
+    found = {method: cable.simulate([0, 0.001], method=method, **given) for method in ("radau5", "dop853")}
     assert ("Factors", found["radau5"].factors) in facts(found["radau5"])
-    assert found["Radau"].factors == f"sparse: 196 states, {len(cable.jacobian_indices().rows)} entries of the derivative"
+    long = elastic_cable(50).embedding().compile(backend="numpy")
+    of_scipy = long.simulate([0, 0.001], method="Radau").factors
+    assert of_scipy == f"sparse: 196 states, {len(long.jacobian_indices().rows)} entries of the derivative"
     assert found["dop853"].factors == "" and "Factors" not in dict(facts(found["dop853"]))
     swing = sd.systems.get("double_pendulum").compile(backend="c").simulate((0, 0.1), method="radau")
     assert swing.factors == "dense: 4 states"
