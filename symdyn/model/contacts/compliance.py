@@ -141,16 +141,23 @@ class Law:
     kinks: tuple[sp.Expr, ...] = ()
 
 
+def positive_part(value: sp.Expr) -> sp.Expr:
+    """Max(0, value). Where assumptions do not tell the sign, SymPy looks for common factors of the whole value to find it, which
+    takes a second for the gap of a torus; that is left out."""
+    known = value >= 0
+    return sp.Max(0, value, evaluate=known in (sp.true, sp.false))
+
+
 def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Expr, rows: Sequence[sp.Expr],
            deflections: Sequence[sp.Symbol], faults: Faults, where: str) -> Law:
     """The forces by the gap, the relative velocities (normal, tangents) and the deflections of bristles."""
     def number(value: Any, what: str) -> sp.Expr:
         return faults.expression(value, f"{where}: {what}")
 
-    depth = sp.Max(0, -gap)
+    depth = positive_part(-gap)
     elastic = number(compliance.stiffness, "stiffness") * depth ** number(compliance.exponent, "exponent")
     damped = 1 - number(compliance.dissipation, "dissipation") * rows[0]
-    normal = elastic if damped == 1 else elastic * sp.Max(0, damped)
+    normal = elastic if damped == 1 else elastic * positive_part(damped)
     slips, kinks = rows[1:], () if damped == 1 else (damped,)
     if not slips:
         return Law((normal,), (), kinks)
@@ -173,7 +180,7 @@ def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Ex
         size = sp.sqrt(sp.Add(*[z**2 for z in deflections]) + SMOOTH * (kinetic / stiffness) ** 2)
         share = sp.Max(0, sp.Min(1, (size / limit - part) / (1 - part)))
         plastic = (1 - sp.cos(sp.pi * share)) / 2
-        outwards = sp.Max(0, sp.Add(*[v * z for v, z in zip(slips, deflections, strict=True)]))
+        outwards = positive_part(sp.Add(*[v * z for v, z in zip(slips, deflections, strict=True)]))
         rates = [v - plastic * outwards * z / (size * limit) for v, z in zip(slips, deflections, strict=True)]
     forces = [-normal * (stiffness * z + damping * rate + viscous * v)
               for z, rate, v in zip(deflections, rates, slips, strict=True)]

@@ -19,6 +19,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import UnsupportedExpression
+from symdyn.model.contacts.compliance import positive_part
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.grid import Spline, grid_spline_of, line_spline_of
 from symdyn.model.contacts.shapes import Bore, Box, Cam, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface, Torus
@@ -373,7 +374,7 @@ class Geometry:
                 angle = center + sp.Float(share) * r / away
                 there = R.xreplace({phi: angle})
                 square = r**2 - (there * sp.sin(angle - center))**2
-                reach = there * sp.cos(angle - center) + sp.sqrt(sp.Max(0, square))
+                reach = there * sp.cos(angle - center) + sp.sqrt(positive_part(square))
                 others.append((angle, sp.Piecewise((-reach, square > 0), (0, True))))
             known, residual = (center, away, r, *named), (phi + tangent.turned - center,)
             deep = _tangent(R, slope, sp.Min(r, _reach(R, tangent, away)))
@@ -475,7 +476,7 @@ class Tangent:
 def _reach(R: sp.Expr, tangent: Tangent, distance: sp.Expr) -> sp.Expr:
     """Distance along the normal of a closed curve of a point that has this distance from its middle; see Tangent."""
     along = R * tangent.normal[0]
-    return sp.sqrt(sp.Max(0, distance**2 - R**2 + along**2)) - along
+    return sp.sqrt(positive_part(distance**2 - R**2 + along**2)) - along
 
 
 def _tangent(R: sp.Expr, slope: sp.Expr, r: sp.Expr) -> Tangent:
