@@ -109,9 +109,8 @@ def whole() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         dense(patch)
         module = pushed().embedding().compile(backend="c")
-        for method in ("radau", "radau5"):
-            for right_side in (RightSide(method=method), RightSide(method=method, work=True)):
-                module.library(right_side)
+        for right_side in (RightSide(method="radau"), RightSide(method="radau5"), RightSide(method="radau5", work=True)):
+            module.library(right_side)
     return module
 
 
