@@ -56,7 +56,7 @@ def start(module: Any) -> dict[str, float]:
 
 @pytest.mark.parametrize(("legs", "height", "friction"), swept(
     [(legs, height, friction) for legs, height in ((LEGS, -0.05), (LEGS, 0.1), (FIVE, -0.05), (FAR, -LOW))
-     for friction in ((STATIC, KINETIC), STATIC)], (LEGS, -0.05, (STATIC, KINETIC)), (FAR, -LOW, STATIC)))
+     for friction in ((STATIC, KINETIC), STATIC)], (LEGS, -0.05, (STATIC, KINETIC))))
 def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(legs: Any, height: float, friction: Any) -> None:
     """A force c t above the middle: at c t = mu_s m g, then m x'' = c t - mu_k m g, though legs carry different loads."""
     push = RATE * np.array([1, 0.3]) / np.hypot(1, 0.3)
@@ -71,9 +71,9 @@ def test_pushed_body_slips_where_the_static_friction_of_all_legs_is_used(legs: A
 @pytest.mark.parametrize(("legs", "push", "height"), [
     (EDGE, (1, 0.3), -LOW), *swept([((*EDGE[:2], (0.2, 0.3), (-0.2, 0.3)), (0, 1), -LOW), (EDGE, (1, 0), -0.09)])])
 def test_legs_that_nothing_presses_have_no_friction(legs: Any, push: Any, height: float) -> None:
-    """The weight is on the edge of two legs, which the others leave alone until the load presses them."""
+    """The weight is on the edge of two legs, which the others leave alone until the load presses them; one coefficient."""
     force = RATE * np.array(push) / np.hypot(*push)
-    module, begin, params = table(legs), STATIC * MASS * G / RATE, load((*force, 0), (0, 0, height))
+    module, begin, params = table(legs, STATIC), STATIC * MASS * G / RATE, load((*force, 0), (0, 0, height))
     solution = module.simulate(np.linspace(0, begin, 13), q=start(module), params=params, rtol=1e-10)
     forces = np.array([contact.force for contact in solution.contacts.values()])
     assert (np.linalg.norm(forces[:, :-1, 1:], axis=2) <= STATIC * forces[:, :-1, 0] + 1e-8 * MASS * G).all()  # softness
@@ -133,13 +133,13 @@ def test_contacts_in_different_planes_end_the_run_where_their_shares_are_not_dec
     top = system.add_body("top", mass=MASS, inertia=[0.02, 0.03, 0.04])
     system.add_joint(sd.Free("free", system.ground, top, orientation=sd.EulerAngles("ZYX")))
     system.add_force(top, [-8.0, 3 * sd.t, 0], point=[0, 0, -0.05])
-    for k, (x, y) in enumerate(LEGS):
+    for k, (x, y) in enumerate(((-0.2, -0.15), (0.2, 0), (-0.2, 0.15))):
         system.add_contact(sd.Contact(f"leg_{k}", top, "ground", shape=sd.contacts.Point([x, y, -LOW]), friction=0.4))
     wall = sd.contacts.Plane([1, 0, 0], [-0.2, 0, 0])
     for k, y in enumerate((-0.1, 0.1)):
         system.add_contact(sd.Contact(f"side_{k}", top, "ground", shape=(sd.contacts.Point([-0.2, y, 0]), wall), friction=0.5))
     module = system.compile()
-    with pytest.warns(SimulationWarning, match=r"leg_3, side_0, side_1 stick and share forces; .* is not decided where "
+    with pytest.warns(SimulationWarning, match=r"leg_2, side_0, side_1 stick and share forces; .* is not decided where "
                                                          r"they are in different planes; fewer contacts"):
         solution = module.simulate((0, 6), q=start(module), rtol=1e-8)
     assert not solution.success and 1 < solution.t[-1] < 4.45 and np.abs(solution.u).max() < 1e-9
