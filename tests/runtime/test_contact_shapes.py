@@ -49,7 +49,7 @@ def rotations(module: Any, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]
 
 def circle(radius: float, axis: np.ndarray, center: np.ndarray) -> np.ndarray:
     turned = Rotation.align_vectors([axis], [[0, 0, 1]])[0].as_matrix()
-    angles = np.linspace(0, 2 * np.pi, 200_001)
+    angles = np.linspace(0, 2 * np.pi, 60_001)
     return center + radius * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles]) @ turned.T
 
 
@@ -93,7 +93,7 @@ CASES: dict[str, tuple[Any, Callable[..., float]]] = {
             lambda p: above(p(CENTER[None] - [[0.1, 0.2, 0.3]]), NORMAL, POINT)),
 }
 # Others have these shapes in other pairs.
-OFTEN = "point", "sphere", "disc", "torus", "cylinder", "spheres", "disc and sphere", "torus in a bore", "box"
+OFTEN = "point", "torus", "cylinder", "disc and sphere", "torus in a bore", "box"
 WAVES = sp.sin(X) * Y / 3
 GRID = np.linspace(-3, 3, 13)
 SPLINE = RectBivariateSpline(GRID, GRID, np.sin(GRID)[:, None] * GRID / 3)
@@ -125,8 +125,7 @@ def test_gap_is_that_of_the_nearest_point(name: str) -> None:
         assert gap == pytest.approx(distance(lambda at, a=(p_a, R_a), b=(p_b, R_b): (at @ a[1].T + a[0] - b[0]) @ b[1]), abs=1e-9)
 
 
-@pytest.mark.parametrize("name", swept([*CASES, *ROUGH], *OFTEN, "curve", "circle on a curve", "surface", "disc on a surface",
-                                        "torus on a spline"))
+@pytest.mark.parametrize("name", swept([*CASES, *ROUGH], *OFTEN, "curve", "circle on a curve", "surface", "torus on a spline"))
 def test_rows_are_the_rate_of_the_gap_and_the_metric_of_the_mass_matrix(name: str) -> None:
     """The first row by differences of the gap along the motion, D = J M^-1 J^T by differences of the rows by the speeds."""
     module = two_bodies(name)
@@ -278,24 +277,29 @@ OFF, SIZE = 0.1, 0.5
 ECCENTRIC = OFF * sp.cos(X) + sp.sqrt(SIZE**2 - OFF**2 * sp.sin(X)**2)
 
 
-def test_a_cam_is_the_eccentric_circle_that_it_describes() -> None:
-    """A roller and a point on a cam that turns, given by an expression and as a periodic spline, against a circle."""
+@cache
+def on_the_cam(shape: Any, cam: Any) -> np.ndarray:
+    """A motion of a roller or a point on a cam that turns."""
+    start: dict[str, Any] = {"q": {"x": 0.05, "y": 1.0, "phi": 0.3}, "u": {"phi_dot": 2.0}, "rtol": 1e-9}
+    solution = on_a_cam((shape, cam)).embedding().compile().simulate((0, 0.6), **start)
+    assert [mode for _, mode in solution.contacts["touch"].switches] == ["open", "sticking"]
+    return np.asarray(solution.x)
+
+
+CIRCLE = Shapes.Sphere(SIZE, (OFF, 0))
+
+
+@pytest.mark.parametrize("shape", swept([SPHERE, Shapes.Point()], SPHERE))
+def test_a_cam_is_the_eccentric_circle_that_it_describes(shape: Any) -> None:
+    assert np.abs(on_the_cam(shape, Shapes.Cam(ECCENTRIC, X)) - on_the_cam(shape, CIRCLE)).max() < 1e-8
+
+
+def test_a_cam_given_as_a_periodic_spline_is_that_of_its_expression() -> None:
     turn = np.linspace(0, 2 * np.pi, 201)
     values = sp.lambdify(X, ECCENTRIC)(turn)
     values[-1] = values[0]
-    spline = CubicSpline(turn, values, bc_type="periodic")
-    start: dict[str, Any] = {"q": {"x": 0.05, "y": 1.0, "phi": 0.3}, "u": {"phi_dot": 2.0}, "rtol": 1e-9}
-
-    def motion(pair: Any) -> np.ndarray:
-        solution = on_a_cam(pair).embedding().compile().simulate((0, 0.6), **start)
-        assert [mode for _, mode in solution.contacts["touch"].switches] == ["open", "sticking"]
-        return np.asarray(solution.x)
-
-    circle = Shapes.Sphere(SIZE, [OFF, 0])
-    rolls = motion((SPHERE, circle))
-    assert np.abs(motion((SPHERE, Shapes.Cam(ECCENTRIC, X))) - rolls).max() < 1e-8
-    assert np.abs(motion((SPHERE, Shapes.Cam(spline, X))) - rolls).max() < 2e-6  # of the interpolation
-    assert np.abs(motion((Shapes.Point(), Shapes.Cam(ECCENTRIC, X))) - motion((Shapes.Point(), circle))).max() < 1e-8
+    spline = Shapes.Cam(CubicSpline(turn, values, bc_type="periodic"), X)
+    assert np.abs(on_the_cam(SPHERE, spline) - on_the_cam(SPHERE, CIRCLE)).max() < 2e-6  # of the interpolation
 
 
 @pytest.mark.parametrize("shape", [Shapes.Point(), SPHERE])
