@@ -96,6 +96,7 @@ def test_tasks_of_multiprocessing_return_solutions() -> None:
     assert all((sol.q == q).all() for sol, q in zip(found, wanted, strict=True))
 
 
+@pytest.mark.sweep
 def test_tasks_of_joblib_return_solutions() -> None:
     joblib = pytest.importorskip("joblib")
     module, wanted = expected()
