@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import signal
@@ -223,6 +224,7 @@ def tops() -> sd.System:
     return system
 
 
+@functools.cache
 def projected(name: str) -> Any:
     if name == "tops":
         return tops().embedding().compile(backend="c")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time as clock
 import warnings
 from typing import Any
@@ -19,6 +20,7 @@ METHODS = [("c", method) for method in ("dop853", "bs54", "radau", "radau5", "au
 SHARED = [("c", "dop853"), ("c", "radau"), ("numpy", "DOP853")]
 
 
+@functools.cache
 def block(load: Any, name: str = "friction", **defaults: float) -> Any:
     """A block of 1 kg on a rail with a load of position x, time and parameters, in the order of their defaults; modules by
     backend."""
@@ -35,6 +37,16 @@ def block(load: Any, name: str = "friction", **defaults: float) -> Any:
 SLIDES = (r"block: stopped at t = 0.58\d*: .*sign\(-v \+ x_dot\) in load friction chatters: the motion is driven onto "
           r"-v \+ x_dot = 0 from both sides, at rates of 2.39 and -3.61 of its unit a second.*for example by "
           r"tanh\(\(-v \+ x_dot\)/eps\) in place of sign\(-v \+ x_dot\) with a small eps, .*an event with stop=True")
+
+
+# A force that vibrates hard enough to move the block ends after 10 s.
+VIBRATES = lambda x: -sp.sign(x.dot) + 3 * sp.sin(3 * sd.t) * (1 - sp.tanh(sd.t - 10)) / 2
+BRAKES = lambda x: sp.Piecewise((-2, x.dot > x), (2, True))
+# Rounding down of the speed drives it to a whole number.
+ROUNDS = lambda x: 1 - 4 * sp.floor(x.dot)
+# A relay by time, a block that slides to and fro, a spring that changes its stiffness: crossed, never held.
+SWITCH = (lambda x: sp.sign(sp.sin(40 * sd.t)), lambda x: -sp.sign(x.dot) + 30 * sp.cos(5 * sd.t),
+          lambda x: -x * sp.Piecewise((400, x > 0), (100, True)), lambda x: -400 * sp.sign(x))
 
 
 @pytest.fixture(scope="module")
@@ -64,16 +76,14 @@ def test_a_block_on_a_moving_belt_stops_where_it_begins_to_stick(rubbing: Any, b
 
 @pytest.mark.parametrize(("backend", "method"), SHARED)
 def test_it_is_found_wherever_it_begins_in_a_long_run(backend: str, method: str) -> None:
-    """A force that vibrates hard enough to move the block ends after 10 s."""
-    module = block(lambda x: -sp.sign(x.dot) + 3 * sp.sin(3 * sd.t) * (1 - sp.tanh(sd.t - 10)) / 2)[backend]
     with pytest.warns(SimulationWarning, match=r"sign\(x_dot\) in load friction chatters"):
-        run = module.simulate((0, 1000), u=[0.1], method=method, rtol=1e-6)
+        run = block(VIBRATES)[backend].simulate((0, 1000), u=[0.1], method=method, rtol=1e-6)
     assert 9 < run.t[-1] < 15
 
 
 @pytest.mark.parametrize(("backend", "method"), SHARED)
 def test_a_condition_is_named(backend: str, method: str) -> None:
-    module = block(lambda x: sp.Piecewise((-2, x.dot > x), (2, True)), "brake")[backend]
+    module = block(BRAKES, "brake")[backend]
     with pytest.warns(SimulationWarning, match=r"the condition .*x.* [<>]=? 0 in load brake chatters: the motion is driven onto "
                                                r".* = 0 from both sides.*weight of the two sides"):
         run = module.simulate((0, 5), u=[0.5], method=method)
@@ -82,10 +92,8 @@ def test_a_condition_is_named(backend: str, method: str) -> None:
 
 @pytest.mark.parametrize(("backend", "method"), SHARED)
 def test_a_floor_is_named(backend: str, method: str) -> None:
-    """Rounding down of the speed drives it to a whole number."""
-    module = block(lambda x: 1 - 4 * sp.floor(x.dot))[backend]
     with pytest.warns(SimulationWarning, match=r"floor\(x_dot\) in load friction chatters"):
-        run = module.simulate((0, 5), u=[0.5], method=method)
+        run = block(ROUNDS)[backend].simulate((0, 5), u=[0.5], method=method)
     assert run["x_dot"][-1] == pytest.approx(1.0, abs=1e-5)
 
 
@@ -99,10 +107,7 @@ def test_the_same_motion_with_the_remedy_reaches_its_end() -> None:
 
 @pytest.mark.parametrize(("backend", "method"), [*SHARED, ("c", "bs54"), ("numpy", "LSODA")])
 def test_what_only_switches_is_no_chattering(backend: str, method: str) -> None:
-    """A relay by time, a block that slides to and fro, a spring that changes its stiffness: crossed, never held."""
-    loads = [lambda x: sp.sign(sp.sin(40 * sd.t)), lambda x: -sp.sign(x.dot) + 30 * sp.cos(5 * sd.t),
-             lambda x: -x * sp.Piecewise((400, x > 0), (100, True)), lambda x: -400 * sp.sign(x)]
-    for load in loads:
+    for load in SWITCH:
         module = block(load)[backend]
         with warnings.catch_warnings():
             warnings.simplefilter("error")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -71,6 +72,7 @@ def test_a_narrow_pulse_ends_the_motion_in_the_run_itself(backend: str) -> None:
     assert backward.t[-1] == pytest.approx(33.3 + 0.2 * ROOT, abs=1e-9)
 
 
+@functools.cache
 def driven(backend: str) -> Any:
     F = sd.inputs("F")
     return particle(lambda y: F - sp.Rational(1, 2)).embedding().compile(backend=backend)

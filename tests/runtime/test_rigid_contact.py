@@ -84,7 +84,7 @@ def test_box_on_two_corners_is_pushed_off_where_all_of_its_static_friction_is_us
     assert solution["x_dot"][-1] == pytest.approx(c * (end**2 - begins**2) / 2 / mass - kinetic * G * (end - begins), rel=1e-9)
 
 
-ULPS = [-1000, -20, -3, -1, 0, 1, 2, 3, 20, 1000]
+ULPS = [-1000, -3, -1, 0, 1, 2, 20]
 COMPILERS = ["SYMDYN_TESTS_QUICK_CC", "SYMDYN_TESTS_NATIVE_CC"]
 EITHER_COMPILER = pytest.mark.parametrize("compiler", COMPILERS)
 BY_TCC = pytest.mark.parametrize("compiler", swept(COMPILERS, COMPILERS[0]))
@@ -260,7 +260,7 @@ def test_block_lifts_off_a_shaken_table_in_every_period() -> None:
             assert sole.impacts.t == pytest.approx([t for t in lands + periods if t < end], abs=1e-10)
 
 
-def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:
+def test_block_on_a_belt_sticks_and_slips_for_many_periods() -> None:
     """It slips from mu_s m g/k on, x = x_k + R cos(w t - phi), until its speed is the belt's again."""
     static, kinetic, speed, k = 0.5, 0.3, 0.2, 100.0
     x, y = sd.coordinates("x y")
@@ -274,18 +274,18 @@ def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:
     w, begins, centre = np.sqrt(k), static * G / k, kinetic * G / k
     slips = (np.pi + 2 * np.arctan2(speed / w, begins - centre)) / w
     period = slips + 2 * (begins - centre) / speed
-    solution = system.compile().simulate((0, begins / speed + 100 * period + 1e-3), u=[speed, 0.0], rtol=1e-13, work=True)
+    solution = system.compile().simulate((0, begins / speed + 30 * period + 1e-3), u=[speed, 0.0], rtol=1e-13, work=True)
     switches = solution.contacts["sole"].switches
     sliding, sticking = (np.array([t for t, mode in switches if mode == kind]) for kind in (SLIDING, STICKING))
-    expected = begins / speed + period * np.arange(101)
-    assert len(sliding) == 101
+    expected = begins / speed + period * np.arange(31)
+    assert len(sliding) == 31
     assert np.abs(sliding - expected).max() < 1e-10
-    assert np.abs(sticking[1:] - (expected[:100] + slips)).max() < 1e-10
+    assert np.abs(sticking[1:] - (expected[:30] + slips)).max() < 1e-10
     balance = solution.energy_balance
     assert np.abs(balance["error"]).max() < 1e-9
     slipped = 2 * (begins - centre) + speed * slips  # of the belt under the block in one period
-    sticks = np.searchsorted(solution.t, expected[100]) - 1  # the last time before it slips again
-    assert balance["friction of sole"][sticks] == pytest.approx(-100 * kinetic * G * slipped, rel=1e-9)
+    sticks = np.searchsorted(solution.t, expected[30]) - 1  # the last time before it slips again
+    assert balance["friction of sole"][sticks] == pytest.approx(-30 * kinetic * G * slipped, rel=1e-9)
 
 
 def test_rocking_block_keeps_housners_times() -> None:
@@ -517,7 +517,7 @@ def test_tippe_top_turns_over_and_keeps_jelletts_integral() -> None:
     system.add_contact(sd.Contact("foot", body, system.ground, shape=sd.contacts.Sphere(radius, [0, 0, offset]), friction=0.2))
     tilt, spin = 0.3, 150.0
     start = [0, 0, radius - offset * np.cos(tilt), np.cos(tilt / 2), np.sin(tilt / 2), 0, 0]
-    solution = system.compile().simulate(np.linspace(0, 1.3, 131), q=start, rtol=1e-12,
+    solution = system.compile().simulate(np.linspace(0, 1.3, 131), q=start, rtol=1e-11,
                                          u=[0, 0, 0, 0, spin * np.sin(tilt), spin * np.cos(tilt)])
     turned = Rotation.from_quat(solution.q[:, [4, 5, 6, 3]])
     axis = turned.apply([0, 0, 1])
@@ -574,25 +574,29 @@ def test_tumbling_box_comes_to_rest_and_its_energy_balances(law: str) -> None:
     assert min(contact.gap.min() for contact in solution.contacts.values()) > -1e-9
 
 
-@pytest.mark.parametrize("formulation", ["embedding", "recursive", "augmented", "absolute"])
-def test_all_formulations_make_the_same_motion(formulation: str) -> None:
-    system = sd.System("pendulum", gravity=[0, -G])
-    a, b = sd.coordinates("a b")
+def pendulum_at_a_wall() -> sd.System:
+    system, (a, b) = sd.System("pendulum", gravity=[0, -G]), sd.coordinates("a b")
     upper, lower = (system.add_body(name, mass=1.0, inertia=0.1, com=[0, -0.5]) for name in ("upper", "lower"))
     system.add_joint(sd.Revolute("first", system.ground, upper, a))
     system.add_joint(sd.Revolute("second", upper, lower, b, parent_point=[0, -1]))
     wall = sd.contacts.Plane([1, 0], [-0.4, 0])
     system.add_contact(sd.Contact("tip", lower, system.ground, shape=(sd.contacts.Point([0, -1]), wall), friction=0.3,
                                   restitution=0.4))
-    absolute = formulation == "absolute"
-    equations = system.augmented(coordinates="absolute") if absolute else getattr(system, formulation)()
-    reference = system.embedding().compile().simulate((0, 1.2), q=[0.5, 0.2], rtol=1e-11)
-    start = None if absolute else [0.5, 0.2]
-    if absolute:
-        system.initial.update({a: 0.5, b: 0.2})
-        equations = system.augmented(coordinates="absolute")
-    solution = equations.compile().simulate((0, 1.2), q=start, rtol=1e-11)
-    tip, expected = solution.contacts["tip"], reference.contacts["tip"]
+    system.initial.update({a: 0.5, b: 0.2})
+    return system
+
+
+@pytest.fixture(scope="module")
+def at_a_wall() -> Solution:
+    return pendulum_at_a_wall().embedding().compile().simulate((0, 1.2), rtol=1e-11)
+
+
+@pytest.mark.parametrize("formulation", ["recursive", "augmented", "absolute"])
+def test_all_formulations_make_the_same_motion(formulation: str, at_a_wall: Solution) -> None:
+    system = pendulum_at_a_wall()
+    equations = system.augmented(coordinates="absolute") if formulation == "absolute" else getattr(system, formulation)()
+    solution = equations.compile().simulate((0, 1.2), rtol=1e-11)
+    tip, expected = solution.contacts["tip"], at_a_wall.contacts["tip"]
     assert [mode for _, mode in tip.switches] == [mode for _, mode in expected.switches]
     assert len(expected.impacts.t) == 1
     assert np.abs(tip.impacts.t - expected.impacts.t).max() < 1e-8
