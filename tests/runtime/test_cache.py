@@ -326,7 +326,7 @@ SOURCE = "METADATA = {{'name': 'line'}}\n{}\nSLOPE = 2.5\n".format("#" * 100)
 
 def test_threads_that_write_the_same_module(folder: Path) -> None:
     """All at once, over and over: each has a scratch file of its own, and none sees a half."""
-    for k in range(20):
+    for k in range(6):
         text, start = SOURCE + f"K = {k}\n" + "A = 1\n" * 2000, threading.Barrier(8)
 
         def make(text: str = text, start: threading.Barrier = start) -> int:
@@ -346,7 +346,7 @@ def test_threads_that_write_the_same_files_leave_no_half(tmp_path: Path) -> None
 
     def write() -> None:
         start.wait()
-        for _ in range(5):
+        for _ in range(2):
             module.write(tmp_path)
 
     with ThreadPoolExecutor(8) as threads:

@@ -89,15 +89,15 @@ def upper(values: np.ndarray) -> np.ndarray:
 
 def test_whirl_of_a_disc() -> None:
     """I (a_ddot) + Ip W b_dot + k a = 0: omega = sqrt(k / I + (Ip W / 2 I)^2) +- Ip W / 2 I, followed through all speeds."""
-    speeds = np.linspace(0, 60, 16)
+    speeds = np.linspace(0, 60, 7)
     diagram = disc().campbell("phi_dot", speeds)
     half = 0.8 * speeds / (2 * 0.5)
     root = np.sqrt(100 + half**2)
     found = diagram.frequencies[:, np.argsort(diagram.frequencies[-1])] * 2 * np.pi
     assert np.allclose(found, np.column_stack([root - half, root + half]), rtol=1e-10)
-    assert np.abs(diagram.damping).max() < 1e-12 and len(diagram.names) == 2 and len(diagram.equilibria) == 16
+    assert np.abs(diagram.damping).max() < 1e-12 and len(diagram.names) == 2 and len(diagram.equilibria) == 7
     assert all(e["phi_dot"] == W for e, W in zip(diagram.equilibria, speeds, strict=True))
-    assert len(repr(diagram).splitlines()) == 18 and "phi_dot" in repr(diagram)
+    assert len(repr(diagram).splitlines()) == 9 and "phi_dot" in repr(diagram)
 
 
 @pytest.mark.parametrize("damped", [0.0, 6.0])

@@ -69,14 +69,14 @@ def test_what_is_above_the_bound_is_marked() -> None:
 def test_states_after_the_run_are_those_of_output_times(method: str, compiled: Any) -> None:
     """In any order and shape, more than once, at the ends, forward and back; rows of the solution to the last bit."""
     double = compiled("double_pendulum", "c")
-    for span in ((0.0, 1.5), (1.5, 0.0)):
+    for span in ((0.0, 0.5), (0.5, 0.0)):
         run = double.simulate(np.linspace(*span, 7), rtol=1e-7, method=method)
-        times = np.random.default_rng(2).uniform(0, 1.5, 50)
+        times = np.random.default_rng(2).uniform(0, 0.5, 50)
         given = double.simulate(np.array([span[0], *sorted(times, reverse=span[0] > 0), span[1]]), rtol=1e-7, method=method)
         np.testing.assert_array_equal(run(run.t), run.x)
         np.testing.assert_array_equal(run(sorted(times, reverse=span[0] > 0)), given.x[1:-1])
-        np.testing.assert_array_equal(run([[times[3], 1.5], [0.0, times[3]]])[[0, 1], [0, 1]], run([times[3], times[3]]))
-        assert run(0.7).shape == (4,) and run([]).shape == (0, 4)
+        np.testing.assert_array_equal(run([[times[3], 0.5], [0.0, times[3]]])[[0, 1], [0, 1]], run([times[3], times[3]]))
+        assert run(0.3).shape == (4,) and run([]).shape == (0, 4)
 
 
 def test_states_after_a_run_with_events_work_and_constraints(compiled: Any) -> None:

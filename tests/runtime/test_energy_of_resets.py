@@ -98,7 +98,13 @@ def test_a_reset_on_constraints_counts_with_its_projection() -> None:
         assert sol.reset_energy["low"][-1] == pytest.approx(-0.75 * 0.8 * G, rel=1e-8) and sol.energy_error() < 1e-8
 
 
-def test_reports_and_summaries_name_the_resets(modules: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reports_and_summaries_name_the_resets(modules: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    from symdyn.pictures import embedded
+
+    for name in ("mechanism", "curves", "balance"):  # text alone, which takes less time
+        monkeypatch.setattr(embedded, name, lambda *arguments: [])
     sol = modules["c"].simulate((0, 0.7), work=True, rtol=1e-10)
     balance = run_tables.energy(sol)
     assert balance is not None and not balance.doubtful and balance.resets["bounce"] == pytest.approx(-0.75 * 2 * G, rel=1e-7)

@@ -335,14 +335,14 @@ def test_threads_with_their_own_parameters(compiled: Callable[..., Any], backend
 
     def work(k: int) -> None:
         barrier.wait()
-        for n in range(60):
+        for n in range(20):
             here, other = params[k], params[(k + 1) % 8]
             for row, result in zip(x[n % 4::4], wanted[k][n % 4::4], strict=True):
                 if not np.array_equal(module.rhs(0.0, row, here), result):
                     faults.append(("rhs", k, n))
             if not np.array_equal(module.evaluate("energy", 0.0, x, other), rows[(k + 1) % 8]):
                 faults.append(("energy", k, n))
-            if n % 20 == 0 and not np.array_equal(module.simulate((0, 1), params=here).x[-1], ends[k]):
+            if n % 10 == 0 and not np.array_equal(module.simulate((0, 1), params=here).x[-1], ends[k]):
                 faults.append(("simulate", k, n))
 
     run_in_threads(work)

@@ -75,7 +75,7 @@ def test_accelerations_are_those_of_the_same_motion_in_t(kind: str, form: str) -
 def test_verify_holds(make, absolute: bool) -> None:
     system = make(z)
     equations = system.augmented(coordinates="absolute") if absolute else system.embedding()
-    result = equations.verify(states=2)
+    result = equations.verify(states=1)
     assert result.passed, str(result)
 
 
@@ -311,8 +311,8 @@ def test_a_regulator_drives_other_inputs_than_motions() -> None:
     linear = module.linearize(module.equilibrium())
     regulator = linear.lqr({x: 1}, {force: 1})
     assert regulator.driven == ("F",) and regulator.K.shape == (1, 2)
-    sol = module.simulate((0, 1), inputs={force: regulator[force], z: as_function}, rtol=1e-6)
-    held = module.simulate((0, 1), inputs={force: sd.Sampled(regulator["F"], 1e-3), z: as_function}, rtol=1e-6)
+    sol = module.simulate((0, 0.3), inputs={force: regulator[force], z: as_function}, rtol=1e-6)
+    held = module.simulate((0, 0.3), inputs={force: sd.Sampled(regulator["F"], 1e-3), z: as_function}, rtol=1e-6)
     assert np.abs(sol.x[-1] - held.x[-1]).max() < 1e-3 and np.ptp(sol.inputs[:, 0]) > 0
     with pytest.raises(ArgumentError, match="R has weights of z, which belong to a motion"):
         linear.lqr({x: 1}, {force: 1, z: 1})

@@ -9,7 +9,7 @@ import symdyn as sd
 from symdyn.runtime.building.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-G, N = 9.81, 8
+G, N = 9.81, 6
 WIDTH, HEIGHT = 0.4, 0.2
 
 

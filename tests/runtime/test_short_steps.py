@@ -86,8 +86,8 @@ def test_noise_and_steep_functions_do_not_end_a_run(pushed: Any) -> None:
              r"the rate of x_dot goes to and fro by 6 a second from step to step, as behind a jump or noise in a load, an input "
              r"or a function of the user; the state there: x = ")
     with pytest.warns(SimulationWarning, match=match):
-        run = pushed["c"].simulate((0, 1), u=[2.0], inputs=noise, max_steps=6000)
-    assert "6000 steps were done" in run.message and len(run.doubts) == 1
+        run = pushed["c"].simulate((0, 1), u=[2.0], inputs=noise, max_steps=3000)
+    assert "3000 steps were done" in run.message and len(run.doubts) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error", SimulationWarning)
         assert pushed["c"].simulate((0, 1), u=[2.0], inputs=lambda t, x: -3 * np.tanh(x[1] / 1e-4)).success
@@ -116,8 +116,8 @@ def always(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     ("c", "radau", 400, {"rtol": 1e-12}),
     ("c", "taylor", 8000, {}),
     ("c", "dop853", 40, {"rtol": 1e-3, "max_step": 0.01}),
-    ("c", "dop853", 400, {"inputs": lambda t, x: np.sin(7 * t)}),
-    ("numpy", "DOP853", 200, {"rtol": 1e-12}),
+    ("c", "dop853", 150, {"inputs": lambda t, x: np.sin(7 * t)}),
+    ("numpy", "DOP853", 60, {"rtol": 1e-12}),
     *swept([("numpy", "Radau", 15, {"rtol": 1e-10})]),
 ])
 def test_steps_that_a_motion_needs_are_not_warned_of(pushed: Any, always: list[int], backend: str, method: str, span: float,

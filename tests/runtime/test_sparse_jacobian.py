@@ -139,7 +139,7 @@ def test_shapes_with_deep_sag_converge_to_the_elastic_catenary() -> None:
 
 def test_errors_of_cables_of_links_are_of_second_order(capsys: pytest.CaptureFixture[str]) -> None:
     """Those of their shapes and of their frequencies, whose limit is nearer to the closed form."""
-    few, many = stiff_cables.compare(30), stiff_cables.compare(60)
+    few, many = stiff_cables.compare(24), stiff_cables.compare(48)
     for name in ("shape_error", "deep_shape_error", "sag_error", "deep_sag_error"):
         assert getattr(many, name) == pytest.approx(getattr(few, name) / 4, rel=0.03), name
     own, limit = np.array(many.own_errors), np.array(many.limit_errors)

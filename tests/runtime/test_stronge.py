@@ -73,7 +73,7 @@ def test_slip_that_turns_round_in_expansion() -> None:
 
 def test_random_impacts_are_those_of_small_steps_and_lose_energy() -> None:
     stream = np.random.default_rng(2)
-    for _ in range(40):
+    for _ in range(15):
         D, mu, e = rod(stream.uniform(0.1, 1.5)), stream.uniform(0, 2), stream.uniform(0, 1)
         v = np.array([-1.0, stream.uniform(-2, 2)])
         one = stronge(D, v, e, Site((0, 1), mu, mu))
@@ -92,7 +92,7 @@ def turned(angle: float) -> np.ndarray:
 
 def test_an_impact_in_space_whose_slip_stays_in_a_plane_is_that_in_the_plane() -> None:
     stream = np.random.default_rng(3)
-    for _ in range(30):
+    for _ in range(12):
         D, mu, e = rod(stream.uniform(0.1, 1.5)), stream.uniform(0, 2), stream.uniform(0, 1)
         v, R = np.array([-1.0, stream.uniform(-2, 2)]), turned(stream.uniform(0, 6))
         in_plane = stronge(D, v, e, Site((0, 1), mu, mu))
