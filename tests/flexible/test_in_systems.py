@@ -140,7 +140,7 @@ def test_identities_in_c_numpy_and_thirty_digits(thrown) -> None:
 
 
 def test_formulations_agree() -> None:
-    errors = cases.agreement(cases.thrown("angles", 1, (2, 1)), cases.thrown("parameters", 1, (2, 1)), 50)
+    errors = cases.agreement(cases.thrown("angles", 1, (2, 1)), cases.thrown("parameters", 1, (2, 1)), 10)
     assert len(errors) == 5 and max(errors.values()) < 1e-12
 
 

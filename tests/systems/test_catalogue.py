@@ -68,8 +68,8 @@ class Pair(NamedTuple):
     oracle: kane.Accelerations
 
 
-# The standard convention is that of test_puma560.py, too.
-REPEATED = ({"n": 1}, {"n": 3}, {"track_inertia": False}, {"convention": "standard"},
+# Both conventions are those of test_puma560.py, too.
+REPEATED = ({"n": 1}, {"n": 2}, {"n": 4}, {"track_inertia": False}, {"convention": "standard"}, {"convention": "modified"},
             {"convention": "standard", "general": True})
 
 

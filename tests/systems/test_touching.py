@@ -29,8 +29,8 @@ def test_the_walker_has_the_published_gait() -> None:
 
 def test_the_block_rocks_as_housner_says() -> None:
     """Its first quarter period by the energy integral, and the rate that an impact leaves, 1 - 3/2 sin^2 alpha of that before."""
-    system = sd.systems.rocking_block()
-    solution = system.compile().simulate(rtol=1e-12)
+    module = sd.systems.rocking_block().compile()
+    solution = module.simulate(rtol=1e-12)
     alpha, reach, g = np.arctan2(0.25, 1.0), np.hypot(0.25, 1.0), 9.81
 
     def slowness(root: float) -> float:
@@ -42,10 +42,11 @@ def test_the_block_rocks_as_housner_says() -> None:
     quarter = quad(slowness, 0, np.sqrt(0.8 * alpha), epsabs=1e-12, epsrel=1e-12)[0]
     right = solution.contacts["right"]
     assert right.impacts.t[0] == pytest.approx(quarter, abs=1e-9)
-    before, after = (system.compile().simulate([0, right.impacts.t[0] + side], rtol=1e-12).u[-1, 2] for side in (-1e-9, 1e-9))
+    before, after = (module.simulate([0, right.impacts.t[0] + side], rtol=1e-12).u[-1, 2] for side in (-1e-9, 1e-9))
     assert after / before == pytest.approx(1 - 1.5 * np.sin(alpha) ** 2, abs=1e-6)
 
 
+@pytest.mark.sweep
 def test_the_woodpecker_comes_to_its_period() -> None:
     """Leine, van Campen and Glocker find a motion of period one; tests/runtime/test_woodpecker.py has its digits."""
     pecks = sd.systems.woodpecker_toy().compile().simulate((0, 3), rtol=1e-9).contacts["beak"].impacts.t

@@ -168,7 +168,7 @@ def test_options_that_there_are_not(make: Any, options: dict[str, Any], message:
 
 def test_three_formulations_agree() -> None:
     """With drives, wind and waves."""
-    found = formulations(50, waves=True)
+    found = formulations(10, waves=True)
     assert len(found) == 5 and max(found.values()) < 1e-12
 
 
