@@ -34,14 +34,14 @@ WARNINGS = ("-Weverything", "-Wno-unknown-warning-option", *(f"-Wno-{name}" for 
 CHECKS = ",".join(["-*", "bugprone-*", "clang-analyzer-*", *(f"-{name}" for name in ALLOWED_CHECKS)])
 
 
-def faults_of(source: Path, *options: str, tidy: bool = True) -> str:
+def faults_of(source: Path, *options: str, tidy: bool = True, checks: str = CHECKS) -> str:
     """Reports of clang and, unless left out, clang-tidy on a source, as far as there are such programs."""
     reports = []
     if clang := shutil.which("clang"):
         reports.append([clang, *LANGUAGE, *WARNINGS, "-fsyntax-only", *options, str(source)])
     analyzer = shutil.which("clang-tidy") if tidy else None
     if analyzer:
-        reports.append([analyzer, "--quiet", f"--checks={CHECKS}", "--header-filter=.*", str(source), "--", *LANGUAGE, *options])
+        reports.append([analyzer, "--quiet", f"--checks={checks}", "--header-filter=.*", str(source), "--", *LANGUAGE, *options])
     # A sanitizer that this process was started with is not for the tools.
     environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"}
     outputs = [subprocess.run(command, capture_output=True, text=True, env=environment) for command in reports]

@@ -76,9 +76,9 @@ def test_steps_at_whose_end_nothing_is_finite_are_made_smaller(context):
             raise NotFinite("too large")
         return [x[1], -10**12 * x[0]]
 
-    run = integrate(field, (context.mpf(0), context.mpf("1e-3")), [context.mpf(1), context.mpf(0)], context.mpf(10)**-14,
+    run = integrate(field, (context.mpf(0), context.mpf("1e-4")), [context.mpf(1), context.mpf(0)], context.mpf(10)**-14,
                     [slice(0, 1), slice(1, 2)], context)
-    assert abs(run.x[0] - context.cos(1000)) <= 1e-10 and run.n_rejected > 0
+    assert abs(run.x[0] - context.cos(100)) <= 1e-10 and run.n_rejected > 0
 
 
 def test_what_is_not_a_number_is_no_agreement(context):

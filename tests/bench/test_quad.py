@@ -107,14 +107,14 @@ def test_midpoint_rule_is_that_of_the_field():
 
 @needs_quad
 def test_midpoint_rule_has_the_bits_of_that_in_python(context):
-    """x_dot = v, v_dot = t v - x/(x + 1) where x + 1 > 0, at 10,000 states, some of which it leaves."""
+    """x_dot = v, v_dot = t v - x/(x + 1) where x + 1 > 0, at 2,000 states, some of which it leaves."""
     r = Recorder()
     t, x, v = (r.leaf(name, COORDINATE) for name in "txv")
     apart = x + 1
     tape = Tape.of(r, rhs=np.array([v, t * v - r.apply("guard", x / apart, apart)], dtype=object))
     ours, theirs = (module.program(tape, context, {}, ["t", "x", "v"]) for module in (quad, precise))
     stream, lost = np.random.default_rng(5), 0
-    for k, row in enumerate((stream.normal(size=(10_000, 4)) * [1, 2, 1, 0.3]).tolist()):
+    for k, row in enumerate((stream.normal(size=(2_000, 4)) * [1, 2, 1, 0.3]).tolist()):
         t0, h, state = context.mpf(row[0]) / 3, context.mpf(row[3]) / 7, [context.mpf(v) / 3 for v in row[1:3]]
         if k % 50 == 0:
             state[0] = context.mpf(-1)
@@ -128,7 +128,7 @@ def test_midpoint_rule_has_the_bits_of_that_in_python(context):
                 ours.midpoint(*arguments)
             continue
         assert ours.midpoint(*arguments) == expected
-    assert 100 < lost < 5000
+    assert 20 < lost < 1000
 
 
 def _field(rhs, t, x):
