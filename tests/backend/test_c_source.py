@@ -37,7 +37,8 @@ def run(*command: Any, folder: Path) -> str:
 
 def check(folder: Path, name: str) -> str:
     """Build the example next to the source and run it."""
-    run("gcc", *STRICT, "-o", "check", "main.c", f"{name}.c", "-lm", folder=folder)
+    run("gcc", *STRICT, "-c", f"{name}.c", folder=folder)
+    run("gcc", *STRICT, "-O0", "-o", "check", "main.c", f"{name}.o", "-lm", folder=folder)
     return run("./check", folder=folder)
 
 
@@ -53,10 +54,18 @@ def test_catalogue_compiles_and_agrees(name: str, derived: Callable[..., Any], w
 
 @pytest.mark.parametrize("name", ["kitchen_sink", "awkward_names", *swept(["driven_oscillator"])])
 def test_every_function_compiles_and_agrees(name: str, derived: Callable[..., Any], write: Callable[..., Path]) -> None:
+    """And needs nothing but the math library."""
     equations = derived(name)
     functions = [f for f in everything(equations) if f != "jacobian_inputs" or equations.symbols.inputs]
-    text = check(write(equations, "c", functions), name)
+    folder = write(equations, "c", functions)
+    text = check(folder, name)
     assert text.endswith("all results agree\n") and text.count(" ok ") >= 2 * len(functions)
+    source = (folder / f"{name}.c").read_text()
+    assert "#include" not in source and "malloc" not in source
+    if shutil.which("nm") is not None:
+        missing = set(re.findall(r"U (\w+)", run("nm", f"{name}.o", folder=folder)))
+        declared = set(re.findall(r"(\w+)\(double", source))
+        assert missing and missing <= declared | OF_THE_COMPILER
 
 
 def test_results_without_entries(derived: Callable[..., Any], write: Callable[..., Path]) -> None:
@@ -85,17 +94,6 @@ def test_example_notices_a_wrong_number(derived: Callable[..., Any], write: Call
     run("gcc", *STRICT, "-o", "check", "main.c", "pendulum.c", "-lm", folder=folder)
     done = subprocess.run([folder / "check"], capture_output=True, text=True)
     assert done.returncode == 1 and "WRONG" in done.stdout and done.stdout.endswith("1 results are wrong\n")
-
-
-@pytest.mark.skipif(shutil.which("nm") is None, reason="no nm here")
-def test_needs_nothing_but_the_math_library(derived: Callable[..., Any], write: Callable[..., Path]) -> None:
-    folder = write(derived("kitchen_sink"), "c")
-    text = (folder / "kitchen_sink.c").read_text()
-    assert "#include" not in text and "malloc" not in text
-    run("gcc", *STRICT, "-c", "kitchen_sink.c", folder=folder)
-    missing = set(re.findall(r"U (\w+)", run("nm", "kitchen_sink.o", folder=folder)))
-    declared = set(re.findall(r"(\w+)\(double", text))
-    assert missing and missing <= declared | OF_THE_COMPILER
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++ here")

@@ -7,7 +7,6 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from symdyn.backend.function import Function
 from symdyn.backend.program import Program
 from symdyn.backend.reference import Reference
 from symdyn.backend.source import backends, template_folders
+from symdyn.cli import main
 from symdyn.errors import CompilerWarning, SymdynError
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
@@ -108,11 +108,8 @@ def test_literals_of_another_kind(derived: Callable[..., Any], folder: Path) -> 
 
 @NODE
 def test_command_line(folder: Path, tmp_path: Path) -> None:
-    pytest.importorskip("symdyn.cli")
-    command = [sys.executable, "-m", "symdyn", "generate", "pendulum", "--templates", str(folder), "--backend", "ecmascript",
-               "--output", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=HERE.parents[1])
-    assert done.returncode == 0, done.stderr
+    assert main(["generate", "pendulum", "--templates", str(folder), "--backend", "ecmascript",
+                 "--output", str(tmp_path / "out")]) == 0
     assert subprocess.run(["node", tmp_path / "out" / "pendulum.js"]).returncode == 0
 
 
@@ -250,10 +247,11 @@ def test_readme_lists_what_a_record_has(heading: str, record: type) -> None:
     assert listed(f"### {heading}\n") == members(record)
 
 
-@pytest.fixture
-def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRecords]:
+@pytest.fixture(scope="module")
+def contexts(derived: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> dict[type, NamedRecords]:
     """Records that the templates of a module in C, an FMU, a Modelica model and the page of a firmware package get."""
     seen: dict[type, NamedRecords] = {}
+    folder = tmp_path_factory.mktemp("contexts")
 
     def spy(self: NamedRecords) -> dict[str, Any]:
         seen.setdefault(type(self), self)
@@ -265,9 +263,9 @@ def contexts(derived: Callable[..., Any], tmp_path: Path) -> dict[type, NamedRec
         patch.setattr(fmu, "find_compiler", lambda: None)
         emit(derived("pendulum"), "c")
         with pytest.warns(CompilerWarning, match="sources and no binary"):
-            derived("pendulum").compile(backend="numpy").to_fmu(tmp_path / "pendulum.fmu")
-        derived("pendulum").compile(backend="numpy").to_modelica(tmp_path / "modelica")
-        derived("pendulum").to_cmake(tmp_path / "firmware")
+            derived("pendulum").compile(backend="numpy").to_fmu(folder / "pendulum.fmu")
+        derived("pendulum").compile(backend="numpy").to_modelica(folder / "modelica")
+        derived("pendulum").to_cmake(folder / "firmware")
     return seen
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import json
 import re
 
 import pytest
@@ -11,12 +14,20 @@ from symdyn.lab import predictions
 from tests.helpers import swept
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("names", swept(["traces", "short loop traces"], "traces"))
-def test_predictions_next_to_sweeps(names, capsys, monkeypatch):
+def here(function, *arguments):
+    """What predictions.apart gives, of this process."""
+    with contextlib.redirect_stdout(io.StringIO()) as told:
+        getattr(predictions, function)(*arguments)
+    return json.loads(told.getvalue().splitlines()[-1])
+
+
+@pytest.mark.parametrize(("names", "apart"), swept([
+    ("traces", here), ("traces", predictions.apart), ("short loop traces", predictions.apart)], ("traces", here)))
+def test_predictions_next_to_sweeps(names, apart, capsys, monkeypatch):
     pytest.importorskip("pyarrow")
     pytest.importorskip("zarr")
     monkeypatch.setattr(predictions, "SWEEPS", {name: predictions.SWEEPS[name] for name in names.split()})
+    monkeypatch.setattr(predictions, "apart", apart)
     assert predictions.run(rows=100_000, part=0.01) == 0
     said = capsys.readouterr().out.splitlines()
     rows = [line.split("|") for line in said if line.startswith(("short", "loop", "traces"))]

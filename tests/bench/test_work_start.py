@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.work import start
+from symdyn.bench.work import picture, start
 from symdyn.bench.work.cases import of_equations, of_system
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
@@ -18,7 +18,19 @@ from tests.mechanisms import four_bar_linkage
 SMALL = {"methods": ["dop853"], "tolerances": [1e-6, 1e-9], "repeats": 1, "end": 1.0}
 
 
-def test_all_formulations_begin_at_the_nearest_state_on_the_constraints(tmp_path):
+@pytest.fixture()
+def drawn(monkeypatch):
+    """Pictures that take no time."""
+    def draw(result, folder):
+        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
+        for path in paths:
+            path.write_text(result.name)
+        return paths
+
+    monkeypatch.setattr(picture, "write_pictures", draw)
+
+
+def test_all_formulations_begin_at_the_nearest_state_on_the_constraints(tmp_path, drawn):
     system = four_bar_linkage()
     before = dict(system.initial)
     result = sd.bench(system, folder=tmp_path, **SMALL)
@@ -66,7 +78,7 @@ def test_other_orientations_than_the_first_would_begin_elsewhere():
         run(about, checked([about], ["augmented:parameters"], ["dop853"], [1e-6], repeats=1))
 
 
-def test_a_motion_that_stands_still_is_reported_and_has_no_best(tmp_path):
+def test_a_motion_that_stands_still_is_reported_and_has_no_best(tmp_path, drawn):
     system = sd.systems.get("pendulum")
     system.initial = {}
     result = sd.bench(system, formulations=["embedding"], folder=tmp_path, **SMALL)

@@ -7,10 +7,12 @@ import pytest
 import symdyn as sd
 from symdyn.stress import touching
 from symdyn.stress.record import FAIL, PASS
+from tests.helpers import swept
 
 
-def test_contacts_pass_under_stress() -> None:
-    rows = list(touching.contacts(True))
+@pytest.mark.parametrize("short", swept([True, False], True))
+def test_contacts_pass_under_stress(short: bool) -> None:
+    rows = list(touching.contacts(short))
     assert [row.system for row in rows] == ["block", "thrown", "bar", "bar", "four_feet", "table", "lifted", *["bouncing"] * 2]
     assert {row.verdict for row in rows} == {PASS}
 

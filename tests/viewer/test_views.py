@@ -44,7 +44,7 @@ in_chromium = pytest.mark.parametrize("every_browser", swept(["chromium", "of_fi
 class Opened:
     """A page from the disk; what it asks for and says is a failure."""
 
-    def __init__(self, opened: Any, path: Path, wide: int = 720, high: int = 540, dark: bool = False) -> None:
+    def __init__(self, opened: Any, path: Path, wide: int = 1280, high: int = 800, dark: bool = False) -> None:
         self.said: list[str] = []
         self.page = opened.new_page(viewport={"width": wide, "height": high}, color_scheme="dark" if dark else "light")
         if not isinstance(self.page, FirefoxPage):  # which is asked in the end
