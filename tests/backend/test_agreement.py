@@ -23,6 +23,8 @@ TOLERANCE = 1e-13
 CASES = [("pendulum", {}, 1), ("double_pendulum", {}, 4), ("cart_pole", {}, 4), ("vehicle_on_rotating_track", {}, 1),
          ("prismatic_chain", {"n": 3}, 1), ("spatial_chain", {"n": 3}, 20), ("three_link_arm", {}, 20),
          ("kitchen_sink", {}, 4), ("awkward_names", {}, 20), ("driven_oscillator", {}, 1)]
+# Kinds of joints and loads that others have, too.
+REPEATED = "pendulum", "cart_pole", "three_link_arm"
 STATES = 4
 
 
@@ -35,7 +37,8 @@ class Routes(NamedTuple):
     factor: float
 
 
-@pytest.fixture(scope="module", params=CASES, ids=lambda case: case[0])
+@pytest.fixture(scope="module", ids=lambda case: case[0], params=[
+    pytest.param(case, marks=pytest.mark.sweep) if case[0] in REPEATED else case for case in CASES])
 def routes(request: pytest.FixtureRequest, derived: Callable[..., Any]) -> Routes:
     name, options, factor = request.param
     equations = derived(name, **options)

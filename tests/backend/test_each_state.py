@@ -17,6 +17,7 @@ from symdyn.errors import EvaluationError, EvaluationWarning
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import PythonLibrary
+from tests.helpers import swept
 from tests.user_functions import BOUNDED
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -89,7 +90,7 @@ def test_every_state_gets_what_it_gets_alone(name: str, function: str) -> None:
 
 
 @needs_c
-@pytest.mark.parametrize("name", LOST)
+@pytest.mark.parametrize("name", swept(LOST, "n_four_bar", "pendulum_absolute", "bricard"))
 def test_the_way_is_the_one_that_c_takes(name: str) -> None:
     """The other way gives MARK instead of its numbers."""
     x = mixed(name)
@@ -216,6 +217,7 @@ def test_parameters_decide_for_single_rows(backend: str) -> None:
         np.testing.assert_array_equal(found[k], one[0])
 
 
+@pytest.mark.every_value
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=needs_c)])
 @pytest.mark.parametrize("ratios", [(3, 7), (0.3, 0.7), (1.1, 1.3)])
 def test_what_only_rounding_holds_is_held_by_nothing(backend: str, ratios: tuple[float, float]) -> None:

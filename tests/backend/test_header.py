@@ -62,8 +62,8 @@ def test_declarations_of_the_header_are_those_of_the_file(system: str, batch: bo
     both = tmp_path / "both.c"
     for text, code in ((f'#include "{system}.h"\n', 0), (f'#include "{system}.h"\nvoid {system}_prologue(void);\n', 1)):
         both.write_text(f'{text}#include "{system}.c"\n')
-        done = subprocess.run([*require_compiler().command, "-std=c99", "-c", both, "-o", tmp_path / "both.o"],
-                              capture_output=True, text=True)
+        read = ["-fsyntax-only"] if require_compiler().kind in ("gcc", "clang") else ["-c", "-o", tmp_path / "both.o"]
+        done = subprocess.run([*require_compiler().command, "-std=c99", *read, both], capture_output=True, text=True)
         assert (done.returncode != 0) == code, done.stderr
 
 

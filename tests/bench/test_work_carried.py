@@ -32,6 +32,14 @@ def bench(tmp_path, monkeypatch):
     return measured
 
 
+@pytest.fixture(scope="module")
+def wide(tmp_path_factory):
+    """Text of the results of a run at all tolerances."""
+    about, folder = named_case("pendulum", end=2.0), tmp_path_factory.mktemp("wide")
+    run(about, checked([about], ["embedding"], ["dop853"], list(WIDE), repeats=1), folder)
+    return (folder / "results.json").read_text()
+
+
 def stored(folder):
     data = json.loads((folder / "results.json").read_text())
     return {m: {(r["formulation"], r["tolerance"]) for r in rows} for m, rows in {
@@ -94,9 +102,8 @@ def test_what_a_run_carries_is_read_as_it_was_written(bench, tmp_path):
 
 @pytest.mark.parametrize("damage", [{"carried": 3}, {"carried": {"x": [3]}}, {"asked": [3]}, {"asked": None}, {"motion": "other"},
                                     {"rows": [{"method": None}]}])
-def test_damaged_files_carry_nothing(bench, tmp_path, damage):
-    bench(WIDE)
-    data = json.loads((tmp_path / "results.json").read_text())
+def test_damaged_files_carry_nothing(bench, wide, tmp_path, damage):
+    data = json.loads(wide)
     (tmp_path / "results.json").write_text(json.dumps({**data, **damage}))
     _, made = bench((*WIDE, 1e-5))
     assert len(made) == 4
