@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import mpmath
@@ -57,11 +58,14 @@ def swept(cases: Iterable[Any], *few: Any) -> list[Any]:
 
 def without_constants_of_modules() -> None:
     """Have hypothesis leave out the numbers of the package's text, which it reads for seconds, and which change from run to
-    run with what is loaded."""
+    run with what is loaded; and look for no garbage where it takes a generator of random numbers, which takes as long."""
+    from hypothesis.internal import entropy
     from hypothesis.internal.conjecture import providers
 
     if hasattr(providers, "_get_local_constants"):
         providers._get_local_constants = lambda: providers._local_constants
+    if hasattr(entropy, "gc"):
+        entropy.gc = SimpleNamespace(collect=lambda: 0, get_referrers=lambda taken: [taken])
 
 
 def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:

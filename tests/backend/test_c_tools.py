@@ -66,8 +66,8 @@ def mechanism(name: str) -> Equations:
 def test_written_mechanisms_are_compiled_without_a_warning(name: str, method: str, batch: bool, tmp_path: Path) -> None:
     write_source(emit(mechanism(name), "c", method=method, batch=batch), tmp_path)
     for source in sorted(tmp_path.glob("*.c")):
-        # The parts of Taylor series are in no text of test_runtime_in_c.py, where clang-tidy sees all others.
-        assert faults_of(source, tidy=method == "taylor") == ""
+        # Clang-tidy sees the parts of the runtime in test_runtime_in_c.py; of Taylor series there is generated code besides.
+        assert faults_of(source, tidy=method == "taylor", checks=f"{CHECKS},-clang-analyzer-*") == ""
         if gcc := real_gcc():
             done = subprocess.run([*gcc, *LANGUAGE, *GCC, "-fsyntax-only", str(source)], capture_output=True, text=True)
             assert done.returncode == 0, done.stderr

@@ -45,6 +45,6 @@ def test_a_sweep_that_fails_is_an_error(tmp_path, capfd):
     (tmp_path / "a.toml").write_text('system = "double_pendulm"\n[initial]\nq1 = [1, 2]\n')
     with pytest.raises(SymdynError, match=r"the sweep a.toml ended with status \d+; what it printed is above"):
         predictions.taken(tmp_path / "a.toml", 1, tmp_path / "out")
-    with pytest.raises(SymdynError, match="merged ended with status 1; what it printed is above"):
-        predictions.apart("merged", "many")
+    with pytest.raises(SymdynError, match="nothing ended with status 1; what it printed is above"):
+        predictions.apart("nothing")
     capfd.readouterr()
