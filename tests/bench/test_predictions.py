@@ -15,7 +15,7 @@ from tests.helpers import swept
 
 
 def here(function, *arguments):
-    """What predictions.apart gives, of this process."""
+    """The result of predictions.apart, of this process."""
     with contextlib.redirect_stdout(io.StringIO()) as told:
         getattr(predictions, function)(*arguments)
     return json.loads(told.getvalue().splitlines()[-1])
