@@ -136,9 +136,9 @@ class _Checker:
         for joint, count in Counter(s.joints).items():
             if count > 1:
                 self.faults.append(f"joint {shown(joint.name)} was added {count} times; add it once")
+        added = Counter(map(id, s.loads))
         for load in {id(load): load for load in s.loads}.values():
-            count = sum(other is load for other in s.loads)
-            if count > 1:
+            if (count := added[id(load)]) > 1:
                 self.faults.append(f"{load.label} was added {count} times; add it once, or make another one")
         for output in s.outputs:
             if not isinstance(output.name, str) or not output.name.isidentifier():

@@ -110,12 +110,9 @@ class Search:
         self.tree, self.solid = tree, solid
         self.sound: set[int] = set()
         self._tried: dict[tuple[Any, ...], np.ndarray] = {}
-        self.moving: list[frozenset[int]] = []
-        self.own: list[list[frozenset[int]]] = []  # of each link, of each of its joint's speeds
-        for link in tree.links:
-            before = self.moving[link.parent] if link.parent >= 0 else frozenset()
-            self.own.append([tree.drivers[k] for k in link.speeds])
-            self.moving.append(before.union(*self.own[-1]))
+        self.own = [[tree.drivers[k] for k in link.speeds] for link in tree.links]  # of each of the joint's speeds
+        # Speeds that move each link and were alive at its turn, of the links so far: with all others they are n^2 in a chain.
+        self.moving: list[set[int]] = []
         bending = [tree.drivers[k] for body in tree.flexible for k in body.speeds]
         self.alive = set(range(tree.D.shape[1])).difference(*bending)
         self.positions = [_Position(tree, k, solid, self.own, self.moving, self.alive) for k in range(POSITIONS)]
@@ -125,7 +122,10 @@ class Search:
         explained: dict[int, frozenset[int]] = {}
         decided: set[int] = set()
         for k in range(len(self.tree.links)):
-            speeds = sorted(self.alive & self.moving[k])
+            parent = self.tree.links[k].parent
+            before = self.moving[parent] if parent >= 0 else set()
+            self.moving.append(self.alive.intersection(before.union(*self.own[k])))
+            speeds = sorted(self.moving[k])
             asked = [p for p in speeds if p not in decided]
             if massless(self.tree, k) or not asked:
                 continue
@@ -173,13 +173,13 @@ class _Position:
     """A tree at random values of everything that it depends on, the same ones of parameters at all positions; links are evaluated
     when they are first requested.
 
-    own, moving   of each link the speeds of its joint, one by one, and all speeds that move it
+    own, moving   of each link the speeds of its joint, one by one, and those that move it, as far as they were alive at its turn
     alive   speeds that are still asked about, which get fewer while the links are gone through
     given   names of what has values of its own
     """
 
     def __init__(self, tree: Tree, seed: int, solid: bool, own: Sequence[Sequence[frozenset[int]]] = (),
-                 moving: Sequence[frozenset[int]] = (), alive: Set[int] = frozenset()) -> None:
+                 moving: Sequence[Set[int]] = (), alive: Set[int] = frozenset()) -> None:
         self.tree, self.solid, self.own, self.moving, self.alive = tree, solid, own, moving, alive
         self.stream = random.Random(seed)
         self.parameters = {parameter.name for parameter in tree.model.parameters}

@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.identification.joint_regrouping import coordinate_axis, unmoved
-from symdyn.formulation.probes.vanishing_pivots import Search, nonzero_indices, vanishing_pivots
+from symdyn.formulation.probes.vanishing_pivots import Search, vanishing_pivots
 from symdyn.formulation.trees.axes import along_coordinate_axis
 from symdyn.formulation.trees.flexible import FlexibleLink
 from symdyn.formulation.trees.water import of_load
@@ -80,6 +80,7 @@ class Tree:
     w = D u + w_t and w_dot = D u_dot + b, with w the speeds of all joints, (n_w,)
     poses      one for each body; ground: pose of the ground's frame
     rates      q_dot, (n_q,)
+    drivers    for each joint speed the indices of the generalized speeds that it is made of: columns of D that are not zero
     added      added mass: number of a link, and that of the water it moves along, about its origin, link axes
     flexible   what elastic coordinates add to the links
     parallel   number of links whose frames are kept parallel to their parents'
@@ -98,6 +99,7 @@ class Tree:
     w_t: np.ndarray
     b: np.ndarray
     rates: list[Any]
+    drivers: tuple[frozenset[int], ...]
     added: tuple[tuple[int, ArticulatedInertia], ...] = ()
     flexible: tuple[FlexibleLink, ...] = ()
     parallel: int = 0
@@ -121,11 +123,6 @@ class Tree:
         if self.plain:
             return u_dot + self.b
         return self.D @ u_dot + self.b if self.D.size else self.b
-
-    @cached_property
-    def drivers(self) -> tuple[frozenset[int], ...]:
-        """For each joint speed the indices of the generalized speeds that it is made of: columns of D that are not zero."""
-        return tuple(nonzero_indices(row) for row in self.D)
 
     @cached_property
     def driven(self) -> tuple[tuple[int, ...], ...]:
@@ -245,9 +242,10 @@ class _Builder:
         D = zeros(len(self.w), len(model.speeds))
         for k, row in enumerate(self.rows):
             D[k, list(row)] = list(row.values())
+        drivers = tuple(frozenset(u for u, e in row.items() if not is_zero(e)) for row in self.rows)
         worked = tuple(self._worked(p) for p in poses)
         return Tree(model, a, links, worked, self._worked(ground), D, vector(*self.w), vector(*self.w_t), vector(*self.b),
-                    self.rates, self._added(worked), self._flexible(links, worked),
+                    self.rates, drivers, self._added(worked), self._flexible(links, worked),
                     sum(part.spin is not None for part in self.parts))
 
     # -- body-fixed frames
