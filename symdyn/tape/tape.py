@@ -6,7 +6,7 @@ A tape never changes. Dead code is what its outputs do not reach; a pass returns
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
@@ -18,6 +18,9 @@ from symdyn.tape.arrays import Arrays
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
+
+# Nodes from which on a list with a place for each one recorded is faster than a set of those that were found.
+MANY = 10_000
 
 
 @dataclass(frozen=True)
@@ -157,11 +160,26 @@ def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
     seen: set[Node] = set(stack)
     pop, push, see = stack.pop, stack.append, seen.add
     while stack:
+        if len(seen) > MANY:
+            return _reached_by_many(seen)
         for a in pop().args:
             if a not in seen and isinstance(a, Node):
                 see(a)
                 push(a)
     return tuple(sorted(seen, key=attrgetter("index")))
+
+
+def _reached_by_many(nodes: Collection[Node]) -> tuple[Node, ...]:
+    """The same for so many nodes that a list with a place for every node recorded takes half the time of a set."""
+    places: list[Node | None] = [None] * (1 + max(node.index for node in nodes))
+    for node in nodes:
+        places[node.index] = node
+    for reached in reversed(places):  # what is filled meanwhile comes later: arguments were recorded before
+        if reached is not None:
+            for a in reached.args:
+                if isinstance(a, Node):
+                    places[a.index] = a
+    return tuple([node for node in places if node is not None])
 
 
 def count_of(nodes: Iterable[Node]) -> dict[str, int]:

@@ -11,7 +11,7 @@ import symdyn as sd
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.arrays import Arrays
 from symdyn.tape.node import COORDINATE, PARAMETER, Node
-from symdyn.tape.tape import unsigned
+from symdyn.tape.tape import MANY, reachable, unsigned
 from tests.helpers import swept
 
 
@@ -53,3 +53,19 @@ def test_a_tape_of_numbers_has_no_steps() -> None:
     tape = Tape.of(Recorder(), y=[1, 2])
     assert tape.arrays.steps == () and tape.running == () and tape.longest_chain() == 0
     assert tape.arrays.indices([1, 2]).tolist() == [-1, -1]
+
+
+def test_many_nodes_are_reached_as_few_are() -> None:
+    recorder = Recorder()
+    x, y = (recorder.leaf(name, PARAMETER) for name in "xy")
+    total, left_out = x, 0
+    for k in range(MANY):
+        total, left_out = total * x + k, left_out + recorder.sin(y * (k + 2))
+    needed, waiting = set(), [total]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Node) and node not in needed:
+            needed.add(node)
+            waiting += node.args
+    assert len(needed) > MANY and left_out not in needed
+    assert reachable([total, 3, total]) == tuple(sorted(needed, key=lambda node: node.index))
