@@ -8,7 +8,6 @@ of ten bodies.
 from __future__ import annotations
 
 import heapq
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -47,18 +46,15 @@ class _Timed(Recorder):
         super().__init__()
         self.ready: list[int] = []
 
-    def _make(self, op: str, args: tuple, mask: int) -> Node:
-        node = super()._make(op, args, mask)
-        ready = self.ready
-        if node.index == len(ready):
-            time = 0
-            if mask & ~PARAMETER and op != "leaf":
-                for a in args:
-                    if isinstance(a, Node) and ready[a.index] > time:
-                        time = ready[a.index]
-                time += _LATENCY.get(op, _FUNCTION)
-            ready.append(time)
-        return node
+    def _new(self, op: str, args: tuple, mask: int) -> Node:
+        ready, time = self.ready, 0
+        if mask & ~PARAMETER and op != "leaf":
+            for a in args:
+                if isinstance(a, Node) and ready[a.index] > time:
+                    time = ready[a.index]
+            time += _LATENCY.get(op, _FUNCTION)
+        ready.append(time)
+        return Node(self, op, args, next(self._numbers), mask, self._section)
 
 
 class _Balancer:
@@ -88,28 +84,29 @@ class _Balancer:
         ways = {op: getattr(recorder, op) for op in ARITHMETIC}
         names, checks = self.old.recorder.names, self.old.recorder.checks
         marked = arrays.marked(names) | arrays.marked(checks)
-        rows = zip(arrays.steps, self.outer.tolist(), marked.tolist(), strict=True)
-        for section, group in groupby(rows, key=lambda row: row[0].section):
-            with recorder.section(section):
-                for node, outer, noted in group:
-                    op, args = node.op, node.args
-                    if inner[args[0].index if op == "neg" else node.index]:
-                        continue
-                    if op == "leaf":
-                        value: Any = recorder.leaf(args[1], args[0])
-                    elif outer:
-                        value = self._sum(node)
-                    else:
-                        again = [new[a.index] if isinstance(a, Node) else a for a in args]
-                        value = ways[op](*again) if op in ways else rebuild(recorder, op, tuple(again))
-                    new[node.index] = value
-                    if noted and isinstance(value, Node):
-                        if node in names:
-                            recorder.name(names[node], value)
-                        if node in checks and op == "guard":
-                            recorder.positive(unsigned(value), checks[node])
-                        elif node in checks:
-                            new[node.index] = recorder.positive(value, checks[node])
+        section = recorder.heading
+        for node, outer, noted in zip(arrays.steps, self.outer.tolist(), marked.tolist(), strict=True):
+            op, args = node.op, node.args
+            if inner[args[0].index if op == "neg" else node.index]:
+                continue
+            if node.section is not section:
+                section = recorder.heading = node.section
+            if outer:
+                value: Any = self._sum(node)
+            elif op in ways:
+                value = ways[op](*[new[a.index] if isinstance(a, Node) else a for a in args])
+            elif op == "leaf":
+                value = recorder.leaf(args[1], args[0])
+            else:
+                value = rebuild(recorder, op, tuple(self._of(a) for a in args))
+            new[node.index] = value
+            if noted and isinstance(value, Node):
+                if node in names:
+                    recorder.name(names[node], value)
+                if node in checks and op == "guard":
+                    recorder.positive(unsigned(value), checks[node])
+                elif node in checks:
+                    new[node.index] = recorder.positive(value, checks[node])
         return Tape(recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
                                for name, o in self.old.outputs.items()})
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
+from itertools import count
 from math import isqrt
 from typing import Any
 
@@ -56,7 +57,8 @@ class Recorder:
 
     def __init__(self) -> None:
         self._known: defaultdict[str, dict[tuple, Node]] = defaultdict(dict)  # operation -> arguments -> node
-        self._count = 0
+        self._negatives: dict[Node, Node] = {}  # by the value without its sign
+        self._numbers = count()
         self._section = ""
         self.names: dict[Node, str] = {}
         self.checks: dict[Node, str] = {}
@@ -95,8 +97,12 @@ class Recorder:
 
     @property
     def heading(self) -> str:
-        """The section under which is recorded now."""
+        """The section under which is recorded now; set where a tape is recorded again, whose steps know theirs."""
         return self._section
+
+    @heading.setter
+    def heading(self, title: str) -> None:
+        self._section = title
 
     def positive(self, node: Any, reason: str) -> Any:
         """The value, which must be positive when it is computed; reason says what it means if not."""
@@ -126,9 +132,11 @@ class Recorder:
         known = self._known[op]
         node = known.get(args)
         if node is None:
-            node = known[args] = Node(self, op, args, self._count, mask, self._section)
-            self._count += 1
+            node = known[args] = self._new(op, args, mask)
         return node
+
+    def _new(self, op: str, args: tuple, mask: int) -> Node:
+        return Node(self, op, args, next(self._numbers), mask, self._section)
 
     def _record(self, op: str, *args: Any) -> Node:
         mask = 0
@@ -217,7 +225,12 @@ class Recorder:
     def neg(self, a: Any) -> Any:
         if not isinstance(a, Node):
             return -exact(a)
-        return a.args[0] if a.op == "neg" else self._make("neg", (a,), a.mask)
+        if a.op == "neg":
+            return a.args[0]
+        negative = self._negatives.get(a)
+        if negative is None:
+            negative = self._negatives[a] = self._new("neg", (a,), a.mask)
+        return negative
 
     def pow(self, base: Any, exponent: Any) -> Any:
         """Integer powers by repeated squaring, half-integer ones by a square root."""
