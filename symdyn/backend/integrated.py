@@ -23,7 +23,7 @@ OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
 OF_CARRYING = ("carried_columns",)
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
-# Stages of a step beside which its control hardly counts.
+# From so many stages of a step on, its control takes hardly any of the time.
 MANY_STAGES = 12
 
 
