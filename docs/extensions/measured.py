@@ -40,6 +40,7 @@ COMMANDS = {
     "bridges": "symdyn bench bridges --sizes 20 50",
     "nets": "symdyn bench nets",
     "windows": "symdyn bench windows",
+    "stiff": "symdyn bench stiff",
     "pages": "symdyn bench pages",
     "sensitivities": "symdyn bench sensitivities",
     "optimize": "symdyn bench optimize",
