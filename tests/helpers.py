@@ -1,9 +1,10 @@
 """Helpers of several tests: numbers for the inputs of a tape, closeness at 30 digits, a pendulum in closed
-form, a browser."""
+form, a browser, records in records."""
 
 from __future__ import annotations
 
 import base64
+import dataclasses
 import random
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -194,3 +195,16 @@ def browser() -> Iterator[Any]:
                                                                                  "--enable-unsafe-swiftshader"])
         yield opened
         opened.close()
+
+
+def records_in(value: Any) -> Iterator[Any]:
+    """Records, and what they hold that may be changed."""
+    if dataclasses.is_dataclass(value):
+        yield value
+        for field in dataclasses.fields(value):
+            yield from records_in(getattr(value, field.name))
+    elif isinstance(value, tuple):
+        for entry in value:
+            yield from records_in(entry)
+    elif isinstance(value, (list, dict, set)):
+        yield value

@@ -7,7 +7,7 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from symdyn.targets import fmu
 from symdyn.targets.cmake import Package, PackageContext, Stack
 from symdyn.targets.fmu_context import Code, Description, Fmu, FmuContext
 from symdyn.targets.modelica_context import Declared, ModelicaContext, ModelicaEquations, ModelicaModel
-from tests.helpers import swept
+from tests.helpers import records_in, swept
 
 HERE = Path(__file__).parent
 SHIPPED = template_folders()[0]
@@ -275,19 +275,6 @@ def contexts(derived: Callable[..., Any], tmp_path_factory: pytest.TempPathFacto
     ("Context of the page of a firmware package", PackageContext)])
 def test_readme_lists_what_templates_get(heading: str, record: type, contexts: dict[type, NamedRecords]) -> None:
     assert listed(f"## {heading}\n") == set(contexts[record].names())
-
-
-def records_in(value: Any) -> Iterator[Any]:
-    """Records, and what they hold that may be changed."""
-    if dataclasses.is_dataclass(value):
-        yield value
-        for field in dataclasses.fields(value):
-            yield from records_in(getattr(value, field.name))
-    elif isinstance(value, tuple):
-        for entry in value:
-            yield from records_in(entry)
-    elif isinstance(value, (list, dict, set)):
-        yield value
 
 
 def test_records_of_templates_are_frozen(contexts: dict[type, NamedRecords]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from symdyn.overview import work as full_work
 from symdyn.stress.page import page as stress_page
 from symdyn.stress.record import Row as StressRow
 from symdyn.stress.record import StressReport
+from tests.helpers import records_in
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("latex2mathml")
@@ -72,19 +72,6 @@ def contexts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, NamedRecords
         for name in ("comparison.html", "errata.html"):
             report(compared(), name)
     return seen
-
-
-def records_in(value: Any) -> Iterator[Any]:
-    """Records, and what they hold that may be changed."""
-    if dataclasses.is_dataclass(value):
-        yield value
-        for field in dataclasses.fields(value):
-            yield from records_in(getattr(value, field.name))
-    elif isinstance(value, tuple):
-        for entry in value:
-            yield from records_in(entry)
-    elif isinstance(value, (list, dict, set)):
-        yield value
 
 
 @pytest.mark.parametrize("context", TEMPLATES)
