@@ -1,7 +1,7 @@
 """The navigation beside every page is made of titles alone.
 
-It shows no headings within pages and no entries of the reference, but Sphinx copies them for it, for each page anew, which took a
-seventh of the time of the site.
+It shows no headings within pages and no entries of the reference, but Sphinx copies them for it again for each page, which took
+a seventh of the time of the site.
 """
 
 from __future__ import annotations

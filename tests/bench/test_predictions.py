@@ -16,9 +16,9 @@ from tests.helpers import swept
 
 def here(function, *arguments):
     """The result of predictions.apart, of this process."""
-    with contextlib.redirect_stdout(io.StringIO()) as told:
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
         getattr(predictions, function)(*arguments)
-    return json.loads(told.getvalue().splitlines()[-1])
+    return json.loads(printed.getvalue().splitlines()[-1])
 
 
 @pytest.mark.parametrize(("names", "apart"), swept([
