@@ -33,12 +33,12 @@ NEAR = 1e-6
 
 
 def contacts(short: bool) -> Iterator[Row]:
-    """All of them; shorter with fewer stiffnesses and tables."""
+    """All of them; shorter with fewer stiffnesses."""
     yield _friction()
     yield _grazing()
     yield from _simultaneous()
     yield _redundant()
-    yield _table(short)
+    yield _table()
     yield _lifted()
     yield from _stiffness(short)
 
@@ -135,7 +135,7 @@ def _redundant() -> Row:
                   "step takes back", "it stays, and carries its weight", "redundant contacts move, or lose weight")
 
 
-def _table(short: bool) -> Row:
+def _table() -> Row:
     """A table on four legs in space, pushed at the floor until friction gives way, with its weight in the middle, on the edge of
     two legs, and nearly there."""
     push, lever = parameters("push lever")
@@ -150,7 +150,7 @@ def _table(short: bool) -> Row:
     begin = 0.6 * 2.0 * G / (4.0 * math.hypot(1, 0.3))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # of the border of two modes
-        for value in (0.0,) if short else (0.15, 1e-3, 0.0):
+        for value in (0.15, 1e-3, 0.0):
             solution = module.simulate((0.0, 1.002 * begin), q={module.metadata.q[2]: 0.1}, params={lever: value}, rtol=1e-10)
             left = [t for name in ("leg_0", "leg_1") for t, mode in solution.contacts[name].switches if mode == SLIDING]
             apart = max(apart, abs(min(left, default=0.0) - begin) / begin)
