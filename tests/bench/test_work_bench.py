@@ -43,18 +43,6 @@ def measured(tmp_path_factory):
     return result, folder
 
 
-@pytest.fixture()
-def drawn(monkeypatch):
-    """Pictures that take no time."""
-    def draw(result, folder):
-        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
-        for path in paths:
-            path.write_text(result.name)
-        return paths
-
-    monkeypatch.setattr(picture, "write_pictures", draw)
-
-
 def test_errors_fall_with_the_tolerance_and_work_rises(measured):
     result, _ = measured
     assert [(r.formulation, r.tolerance) for r in result.rows] == [

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.work import picture, start
+from symdyn.bench.work import start
 from symdyn.bench.work.cases import of_equations, of_system
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
@@ -16,18 +16,6 @@ from symdyn.errors import SymdynError
 from tests.mechanisms import four_bar_linkage
 
 SMALL = {"methods": ["dop853"], "tolerances": [1e-6, 1e-9], "repeats": 1, "end": 1.0}
-
-
-@pytest.fixture()
-def drawn(monkeypatch):
-    """Pictures that take no time."""
-    def draw(result, folder):
-        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
-        for path in paths:
-            path.write_text(result.name)
-        return paths
-
-    monkeypatch.setattr(picture, "write_pictures", draw)
 
 
 def test_all_formulations_begin_at_the_nearest_state_on_the_constraints(tmp_path, drawn):
